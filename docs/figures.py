@@ -15,8 +15,8 @@ from matplotlib.patches import Circle, Patch
 
 from convexrough import press, shear
 from convexrough.paper import example
+from convexrough.paper.example import PaperStates
 from convexrough.paper.figures import paper_figures
-from convexrough.paper.states import PaperStates
 
 FOLDER = Path(__file__).parent / "figures"
 EXAMPLES = Path(__file__).parents[1] / "examples"

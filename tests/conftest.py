@@ -109,8 +109,7 @@ class Here(ThreadPoolExecutor):
 
 @pytest.fixture
 def no_processes(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in ("pool", "sweep"):
-        monkeypatch.setattr(f"convexrough.sweeps.{module}.Processes", Here)
+    monkeypatch.setattr("convexrough.sweeps.sweep.Processes", Here)
 
 
 @pytest.fixture(autouse=True)

@@ -35,7 +35,8 @@ def run(output: Output, scene: Path) -> int:
     with a sphere and friction. A file with a table [sweep] is computed as by `convexrough sweep`.
     """
     from convexrough import checks
-    from convexrough.run.results import origin, prove_results, slider_page
+    from convexrough.plots.slider import slider_html
+    from convexrough.run.results import origin, prove_results
     from convexrough.run.scene_file import has_sweep, read_scene
 
     if has_sweep(scene):
@@ -58,7 +59,7 @@ def run(output: Output, scene: Path) -> int:
             say_aside("warning", caution)
         with blamed_on(scene), progress("computing"):
             results = file.compute(contact)
-            page = slider_page(results[0]) if output.html else None
+            page = slider_html(contact, results[0].lines()) if output.html else None
             new.results(results, figures=not output.no_figures)
             new.text("scene.toml", file.text)
             if page is not None:
@@ -129,14 +130,13 @@ def _swept(
     scheduler: str | None = None,
     **options: Any,
 ) -> int:
-    from convexrough.sweeps.plan import read_sweep
-    from convexrough.sweeps.pool import Processes, dask
+    from convexrough.sweeps.plan import plan_of
     from convexrough.sweeps.report import cautions, describe, failures, progress_kept, summarise
-    from convexrough.sweeps.sweep import run
+    from convexrough.sweeps.sweep import Processes, dask, run
 
     folder = output.out or Path(f"{sweep.stem}-sweep")
     with progress("reading the first scene"):
-        plan = read_sweep(sweep)
+        plan = plan_of(sweep)
     try:
         pool = Processes(workers) if scheduler is None else dask(scheduler)
         with progress(str(sweep)), pool as executor:
@@ -164,8 +164,8 @@ def _say_summary(folder: Path, output: Output) -> int:
     lines = [*report.describe(said), "", *report.describe_quantiles(found)]
     if output.out is not None:
         with progress("writing results"), output.folder(output.out) as new:
-            report.write_summary(new, table, found)
-        lines += [*written(new), *report.figures_left_out(table)]
+            left_out = report.write_summary(new, table, found)
+        lines += [*written(new), *left_out]
     output.say({**said, "quantiles": rows_of(found)}, lines)
     return _status(said)
 

@@ -220,9 +220,9 @@ def paper(output: Output) -> int:
     Tables and figures go to the folder paper-results unless --out names another.
     """
     from convexrough.paper import example
+    from convexrough.paper.example import PaperStates
     from convexrough.paper.figures import figure_data, paper_figures
-    from convexrough.paper.states import PaperStates
-    from convexrough.run.results import slider_page
+    from convexrough.plots.slider import slider_html
 
     with output.folder(Path("paper-results")) as new, progress("reproducing the paper"):
         found = example.results()
@@ -232,7 +232,7 @@ def paper(output: Output) -> int:
         if not output.no_figures:
             new.figures(paper_figures(states))
         if output.html:
-            new.text("slider.html", slider_page(found[0]))
+            new.text("slider.html", slider_html(states.contact, found[0].lines()))
         more = {"paper": comparison}
         new.results(found, figures=False, more=more)
     return output.say_results(found, ["", *example.table(comparison), *written(new)], more)

@@ -3,7 +3,6 @@
 `convexrough gallery --export DIR` writes them as files for qpsolvers, Clarabel and CBF readers.
 """
 
-from convexrough.gallery.any_size import Manufactured, manufactured
-from convexrough.gallery.cases import Checked, HardCase, case, names
+from convexrough.gallery.cases import Checked, HardCase, Manufactured, case, manufactured, names
 
 __all__ = ["Checked", "HardCase", "Manufactured", "case", "manufactured", "names"]

@@ -1,11 +1,11 @@
-"""Hard cases: a scene, the prescribed quantity, and the answer to compare results with."""
+"""Hard cases, and contacts of any size made from chosen loads and gaps: scenes with answers."""
 
 from __future__ import annotations
 
 import json
 import random
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache, cached_property
 from importlib.resources import files
@@ -17,8 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.errors import InputError
+from convexrough.influence.choice import couple
 from convexrough.record import Record
-from convexrough.scene.asperities import Asperities
+from convexrough.scene.asperities import Asperities, checked_seed
 from convexrough.scene.material import Material
 from convexrough.scene.scene import Scene
 
@@ -192,20 +193,14 @@ def case(name: str) -> HardCase:
         expected = f"the name of a case; {checks.nearest(str(name), stored())}"
         raise InputError("name", found=repr(name), expected=expected)
     data = stored()[name]
-    answer = data["answer"]
+    answer, turns = data["answer"], np.array(_reversals(data["reversals"]))
+    known: dict[str, Any] = {each: data[each] for each in ("family", "why", "shear_force")}
+    known |= {each: data["prescribed"].get(each) for each in ("approach", "load")}
+    known |= {f"exact_{each}": answer[each] for each in ("approach", "load")}
+    known |= {each: tuple(answer[each]) for each in ("loads", "gaps", "forces", "slips")}
+    known |= {"displacement": answer["displacement"]}
     return HardCase(
-        name=name,
-        family=data["family"],
-        why=data["why"],
-        scene=scene_of(data),
-        approach=data["prescribed"].get("approach"),
-        load=data["prescribed"].get("load"),
-        exact_approach=answer["approach"],
-        exact_load=answer["load"],
-        displacement=answer["displacement"],
-        shear_force=data["shear_force"],
-        history=frozen(np.array(_reversals(data["reversals"])) * data["shear_force"]),
-        **{each: tuple(answer[each]) for each in ("loads", "gaps", "forces", "slips")},
+        name, scene=scene_of(data), history=frozen(turns * data["shear_force"]), **known
     )
 
 
@@ -236,3 +231,53 @@ def _reversals(kind: str) -> list[float]:
             turns.append(0.0 if k % 7 == 0 else value)
         return [*turns, 1.0]
     return []
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Manufactured(Record):
+    """A contact made by `manufactured`, whose answer is known up to the rounding of its heights.
+
+    `cr.certify(made.scene, made.loads, approach=made.approach)` bounds the effect of this rounding
+    and proves the statuses.
+
+    approach : [length] the prescribed approach
+    loads    : (n,) [force] 0 where open;  gaps : (n,) [length] 0 where touching
+    """
+
+    scene: Scene
+    approach: float
+    loads: Array
+    gaps: Array
+
+
+def manufactured(count: int, *, seed: int = 0, touching: float = 0.7) -> Manufactured:
+    """A contact of `count` asperities on a hexagonal lattice, with a known answer.
+
+    Each asperity touches with the probability `touching`. Contact radii are random from 0.1 to 0.45
+    spacings, tip radii from 4 to 8 spacings, and gaps from 0 to the largest indentation. With other
+    versions of numpy, a `seed` may give other numbers. Raises InputError for a `count` below 1, or
+    if `touching` is not from 0 to 1.
+
+    >>> made = cr.gallery.manufactured(500)
+    >>> proof = cr.certify(made.scene, made.loads, approach=made.approach)
+    >>> proof.all_proved, bool(proof.load_errors.max() < 1e-9 * made.loads.max())
+    (True, True)
+    """
+    checks.whole("count", count)
+    part = checks.between("touching", touching, 0.0, 1.0)
+    random = np.random.default_rng(checked_seed(seed))
+    patch = Asperities.hexagonal(spacing=1.0, tip_radius=1.0, within=0.6 * np.sqrt(count) + 1)
+    tips = random.uniform(4.0, 8.0, count)
+    flat = Asperities(patch.positions[:count], tips)
+    scene = Scene(1e3 * np.sqrt(count), flat, MATERIAL, FRICTION, geometry="summit")
+
+    touches = random.random(count) < part
+    radii = np.where(touches, random.uniform(0.1, 0.45, count), 0.0)
+    own = radii**2 / scene.relative_radii
+    gaps = np.where(touches, 0.0, random.uniform(0.0, own.max(initial=0.0) or 1.0, count))
+    loads = 4.0 / 3.0 * MATERIAL.contact_modulus * radii * own
+    coupling = couple(scene, np.arange(count), 1.0 / (np.pi * MATERIAL.contact_modulus), None)
+    heights = own + coupling.apply(loads) - gaps - scene.offsets
+    approach = float(heights.max())
+    tall = replace(scene, asperities=Asperities(flat.positions, tips, heights - approach))
+    return Manufactured(tall, approach, frozen(loads), frozen(gaps))

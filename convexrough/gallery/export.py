@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from convexrough.arrays import Array
 from convexrough.atomic import to_json
 from convexrough.errors import ConvexroughError
 from convexrough.gallery.cases import HardCase, case, stored
@@ -18,12 +17,10 @@ from convexrough.progress import LOGGER
 from convexrough.tabular.columns import markdown
 from convexrough.version import __version__
 
-#: Number of bristles (springs) of each asperity; its smallest value; and the number of variables
-#: above which fewer bristles are used. These heuristics keep files small.
-BRISTLES, FEWEST_BRISTLES, VARIABLES = 64, 8, 520
-
-#: Largest number of asperities of a cone program that is also written as CBF.
-SMALL = 20
+#: Number of bristles (springs) of each asperity; its smallest value; the number of variables above
+#: which fewer bristles are used; and the largest number of asperities of a cone program that is
+#: also written as CBF. These heuristics keep files small.
+BRISTLES, FEWEST_BRISTLES, VARIABLES, SMALL = 64, 8, 520, 20
 
 HEADING = ["case", "what is hard", "files", "asperities", "touching", "variables", "condition"]
 HEADING += ["spread", "proved"]
@@ -72,23 +69,27 @@ def _packed(case: HardCase) -> tuple[About, dict[str, bytes]]:
     loads = np.array([float(digits) for digits in case.loads])
     own = loads[problem.candidates] / problem.units.force
     proof, data = certify(case.scene, loads, **case.control), stored()[case.name]
-    bound = float(proof.load_errors.max())
+    bound, eigenvalues = float(proof.load_errors.max()), scaled_eigenvalues(problem, own)
+    low, high = eigenvalues[0], eigenvalues[-1]
     answer = {name: data["answer"][name] for name in ("approach", "load", "loads", "gaps")}
+    answer |= {"shear_force": case.shear_force, "shear_forces": list(case.forces)}
+    answer |= {"slips": list(case.slips), "displacement": case.displacement}
     about: About = {
         "family": case.family,
         "why": case.why,
         "scene": {name: data[name] for name in SCENE},
         "prescribed": case.control,
-        **_hardness(problem, own),
+        "asperities": len(problem.scene),
+        "touching": int(np.count_nonzero(own)),
+        "condition": float(high / low) if low > 0 else None,
+        "spread": float(own[own > 0].min() / own.max()),
         "certificate": {
             "scope": proof.scope,
             "convexity_number": proof.convexity_number,
             "load_error": bound if np.isfinite(bound) else None,
             "undecided": np.flatnonzero(proof.status == "undecided").tolist(),
         },
-        "answer": answer
-        | {"shear_force": case.shear_force, "shear_forces": list(case.forces)}
-        | {"slips": list(case.slips), "displacement": case.displacement},
+        "answer": answer,
         "programs": {},
         "left_out": {},
     }
@@ -110,21 +111,8 @@ def _packed(case: HardCase) -> tuple[About, dict[str, bytes]]:
     return about, files
 
 
-def _hardness(problem: NormalProblem, own: Array) -> About:
-    """The condition number of the scaled Hessian, and the smallest load over the largest load."""
-    eigenvalues = scaled_eigenvalues(problem, own)
-    positive = eigenvalues[0] > 0
-    return {
-        "asperities": len(problem.scene),
-        "touching": int(np.count_nonzero(own)),
-        "condition": float(eigenvalues[-1] / eigenvalues[0]) if positive else None,
-        "spread": float(own[own > 0].min() / own.max()),
-    }
-
-
 def _row(name: str, about: About) -> list[str]:
-    programs = about["programs"]
-    condition = about["condition"]
+    programs, condition = about["programs"], about["condition"]
     variables = dict.fromkeys(str(each["variables"]) for each in programs.values())
     return [
         name,

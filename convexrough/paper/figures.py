@@ -8,14 +8,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 from matplotlib.patheffects import withStroke
-from numpy.typing import NDArray
 
 from convexrough import checks, fields
 from convexrough.arrays import Array
 from convexrough.friction.cycle import Loop
 from convexrough.friction.path import LoadPath
 from convexrough.friction.shear import ShearState
-from convexrough.paper.states import AMPLITUDES, READ_CROSSING, SHARE, PaperStates
+from convexrough.paper.example import AMPLITUDES, READ_CROSSING, SHARE, PaperStates
 from convexrough.plots import style
 from convexrough.plots.asperity_map import SLIDING, STICK, draw_values
 from convexrough.plots.cycle import loops_figure, ring_colour, smooth_loop
@@ -23,23 +22,14 @@ from convexrough.plots.notebook import Figure, Figures, panels
 from convexrough.plots.press import abscissae, map_and_profile, pressure_figure, towards_rim
 from convexrough.plots.shear import draw_state, legend_handles
 from convexrough.plots.style import DASHED, DOTTED, DOUBLE, ROUGH, SMOOTH, TICK, UNSURE, Scale
+from convexrough.run.stage import Columns
 from convexrough.sphere.smooth import smooth
 
 
 def paper_figures(found: PaperStates) -> Figures:
     """The figures of the paper's example, for asperities in at most 26 rings, without units.
 
-    "fig3_pressure"   : contact pressure
-    "fig4_rings"      : rings of asperities, those that slide at Q / (f P) = 0.5, and the force at
-        which the first asperity of each ring starts to slide
-    "fig5_traction"   : shear traction at Q / (f P) = 0.5, of all asperities and on the central one
-    "fig6_section"    : traction and f * pressure along y = 0, also of the smooth sphere
-    "fig7_asperities" : force and displacement of an asperity of each ring from Q = 0 to f P
-    "fig8_loops"      : hysteresis loops between -0.5 f P and 0.5 f P: rough and smooth contact,
-        single asperities
-    "fig9_energy"     : energy per cycle against amplitude, rough and smooth, and their crossing
-
-    Rings have letters as in the paper: A is the outermost.
+    Rings have letters as in the paper: A is the outermost. States are those at Q / (f P) = 0.5.
     """
     scale, loops = Scale(found.contact), ([found.steady], [found.loop])
     return Figures(
@@ -54,6 +44,7 @@ def paper_figures(found: PaperStates) -> Figures:
 
 
 def _rings_figure(found: PaperStates, scale: Scale) -> Figure:
+    """Rings; those that slide; the forces at which the first asperity of each starts to slide."""
     contact, named, onsets = found.contact, found.named, found.onsets
     how = {"width_ratios": [1.0, 0.9], "gridspec_kw": {"wspace": 0.06}}
     figure, (chart, bars) = panels(DOUBLE, 3.4, 1, 2, **how)
@@ -97,6 +88,7 @@ def _tractions(scale: Scale) -> tuple[float, style.Measure]:
 
 
 def _traction_figure(found: PaperStates, scale: Scale) -> Figure:
+    """Shear traction of all asperities, and on the central one."""
     state, contact, (f, unit) = found.half, found.contact, _tractions(scale)
     centre = next(iter(found.firsts.values()))
     figure, (chart, profile) = map_and_profile()
@@ -136,6 +128,7 @@ def _draw_tractions(axes: Axes, state: ShearState, scale: Scale, unit: style.Mea
 
 
 def _section_figure(found: PaperStates, scale: Scale) -> Figure:
+    """Traction and f * pressure along y = 0, also of the smooth sphere."""
     state, contact, (f, unit) = found.half, found.contact, _tractions(scale)
     sphere = smooth(contact.scene, load=contact.load)
     figure, (axes,) = panels(DOUBLE, 2.9)
@@ -162,7 +155,7 @@ def _section_figure(found: PaperStates, scale: Scale) -> Figure:
 
 
 def _forces_figure(found: PaperStates, scale: Scale) -> Figure:
-    """The figure of force and displacement of the first asperity of each ring, for Q = 0 to f P."""
+    """Force and displacement of the first asperity of each ring, for Q = 0 to f P."""
     figure, (left, right) = panels(DOUBLE, 3.2, 1, 2, gridspec_kw={"wspace": 0.06})
     firsts, path, share = found.firsts, found.path, found.fractions
     force = 100.0 * path.asperity_forces / found.limit
@@ -203,14 +196,12 @@ def _letters(axes: Axes, names: list[str], heights: Array) -> None:
         placed[:-1] -= close / 2
         placed[1:] += close / 2
     for k, y in zip(order, placed, strict=True):
-        where: dict[str, Any] = {"textcoords": "offset points", "xytext": (6, 0)}
-        axes.annotate(
-            names[k], (1.0, y), fontsize=TICK, va="center", annotation_clip=False, **where
-        )
+        axes.annotate(names[k], (1.0, y), xytext=(6, 0), textcoords="offset points", va="center",
+                      fontsize=TICK, annotation_clip=False)  # fmt: skip
 
 
 def _loss_figure(found: PaperStates, scale: Scale) -> Figure:
-    """The figure of energy per cycle against amplitude, rough and smooth, with a zoom."""
+    """Energy per cycle against amplitude, rough and smooth, with a zoom on their crossing."""
     figure, (whole, zoom) = panels(DOUBLE, 3.0, 1, 2, gridspec_kw={"wspace": 0.06})
     energy = scale.energy(max(each.loss for each in found.cycles))
     rough = np.array([energy.of(each.loss) for each in found.cycles])
@@ -228,26 +219,20 @@ def _loss_figure(found: PaperStates, scale: Scale) -> Figure:
     whole.add_patch(box)
     whole.annotate("zoom", (float(window[1]), high), xytext=(-2, 3), textcoords="offset points",
                    ha="right", va="bottom", fontsize=TICK)  # fmt: skip
-    _mark_crossing(zoom, found.crossing, float(np.interp(found.crossing, AMPLITUDES, smooth)))
+    crossing = found.crossing, float(np.interp(found.crossing, AMPLITUDES, smooth))
+    zoom.axvline(READ_CROSSING, ls=DOTTED, lw=1.0, color=SMOOTH, label="_read")
+    zoom.plot(*crossing, "o", ms=5, mfc="white", mec=UNSURE, mew=1.3, label="_crossing")
+    zoom.annotate(f"curves cross at {found.crossing:.3f}", crossing, xytext=(10, -14),
+                  textcoords="offset points", fontsize=TICK, color=UNSURE)  # fmt: skip
+    said = f"read off the paper's\ngraph: about {READ_CROSSING:g}"
+    zoom.annotate(said, (READ_CROSSING, low), xytext=(4, 4), fontsize=TICK,
+                  textcoords="offset points", va="bottom")  # fmt: skip
     style.label(whole, "amplitude of $Q\\,/\\,(fP)$", energy.label("W"))
     style.label(zoom, "amplitude of $Q\\,/\\,(fP)$", energy.short("W"))
     style.legend(whole, "inside")
     style.title(whole, "energy lost per cycle")
     style.title(zoom, "zoom")
     return figure
-
-
-def _mark_crossing(axes: Axes, crossing: float, height: float) -> None:
-    axes.axvline(READ_CROSSING, ls=DOTTED, lw=1.0, color=SMOOTH, label="_read")
-    axes.plot(crossing, height, "o", ms=5, mfc="white", mec=UNSURE, mew=1.3, label="_crossing")
-    axes.annotate(f"curves cross at {crossing:.3f}", (crossing, height), xytext=(10, -14),
-                  textcoords="offset points", fontsize=TICK, color=UNSURE)  # fmt: skip
-    said = f"read off the paper's\ngraph: about {READ_CROSSING:g}"
-    axes.annotate(said, (READ_CROSSING, axes.get_ylim()[0]), xytext=(4, 4), fontsize=TICK,
-                  textcoords="offset points", va="bottom")  # fmt: skip
-
-
-Columns = dict[str, NDArray[Any]]
 
 
 def figure_data(found: PaperStates) -> dict[str, Columns]:
@@ -259,10 +244,14 @@ def figure_data(found: PaperStates) -> dict[str, Columns]:
     line = np.column_stack((x, np.zeros_like(x)))
     close = np.linspace(0.0, 1.2, 241) * contact.contact_radii[0]
     radial = np.column_stack((close, np.zeros_like(close)))
-    x_i, y_i = contact.scene.asperities.positions.T
-    letters = np.full(len(x_i), "", dtype="<U1")
+    places = dict(zip("xy", contact.scene.asperities.positions.T, strict=True))
+    letters = np.full(len(contact.loads), "", dtype="<U1")
     for name, ring in found.named.items():
         letters[ring] = name
+
+    def tractions(points: Array) -> Columns:
+        most = f * fields.pressure(contact, points)
+        return {"friction_limit": most, "traction": fields.traction(half, points)}
 
     def of_each_ring(states: LoadPath | Loop) -> Columns:
         """Forces and displacements of the first asperity of each ring."""
@@ -271,52 +260,31 @@ def figure_data(found: PaperStates) -> dict[str, Columns]:
         return columns | {f"displacement_{name}": moved[:, i] for name, i in found.firsts.items()}
 
     return {
-        "fig3_pressure": {
-            "x": x,
-            "pressure": fields.pressure(contact, line),
-            "smooth_pressure": sphere.pressure(np.abs(x)),
-        },
-        "fig4_rings": {
-            "x": x_i,
-            "y": y_i,
-            "ring": letters,
-            "load": contact.loads,
-            "status_at_half": half.status,
-        },
+        "fig3_pressure": dict(
+            x=x, pressure=fields.pressure(contact, line), smooth_pressure=sphere.pressure(abs(x))
+        ),
+        "fig4_rings": dict(**places, ring=letters, load=contact.loads, status_at_half=half.status),
         "fig5_traction": {
-            "x": x_i,
-            "y": y_i,
-            "contact_radius": contact.contact_radii,
-            "stick_radius": half.stick_radii,
-            "load": contact.loads,
-            "force": half.forces,
+            **(places | contact.columns("contact_radii") | half.columns("stick_radii")),
+            **(contact.columns("loads") | half.columns("forces")),
         },
-        "fig5_centre": {
-            "r": close,
-            "friction_limit": f * fields.pressure(contact, radial),
-            "traction": fields.traction(half, radial),
-        },
-        "fig6_section": {
-            "x": x,
-            "friction_limit": f * fields.pressure(contact, line),
-            "traction": fields.traction(half, line),
-            "smooth_traction": sphere.traction(np.abs(x), half.force),
-        },
-        "fig7_asperities": {
-            "fraction": found.fractions,
-            "displacement": path.displacements,
-            **of_each_ring(path),
-        },
-        "fig8_loops": {
-            "force": loop.forces,
-            "displacement": loop.displacements,
-            "smooth_displacement": smooth_loop(sphere, loop.forces),
+        "fig5_centre": dict(r=close, **tractions(radial)),
+        "fig6_section": dict(
+            x=x, **tractions(line), smooth_traction=sphere.traction(abs(x), half.force)
+        ),
+        "fig7_asperities": dict(
+            fraction=found.fractions, displacement=path.displacements, **of_each_ring(path)
+        ),
+        "fig8_loops": dict(
+            force=loop.forces,
+            displacement=loop.displacements,
+            smooth_displacement=smooth_loop(sphere, loop.forces),
             **of_each_ring(loop),
-        },
-        "fig9_energy": {
-            "fraction": AMPLITUDES,
-            "loss": np.array([cycle.loss_normalised for cycle in found.cycles]),
-            "smooth_loss": np.array([cycle.smooth_normalised for cycle in found.cycles]),
-            "balance_defect": np.array([cycle.balance_defect for cycle in found.cycles]),
-        },
+        ),
+        "fig9_energy": dict(
+            fraction=AMPLITUDES,
+            loss=np.array([cycle.loss_normalised for cycle in found.cycles]),
+            smooth_loss=np.array([cycle.smooth_normalised for cycle in found.cycles]),
+            balance_defect=np.array([cycle.balance_defect for cycle in found.cycles]),
+        ),
     }

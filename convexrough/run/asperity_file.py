@@ -19,17 +19,9 @@ from convexrough.tabular.units import bare, parsed
 RESULTS = ("load", "contact_radius", "mean_pressure", "gap", "load_error", "force", "pressure",
            "area", "contact")  # fmt: skip
 
-#: Largest number of columns that a message names.
-MOST_NAMED = 5
-
-#: A last row counts as the means or sums of the other rows if it differs from these by at most this
-#: fraction of the range of each column.
-ROUNDED = 1e-3
-
-
-def unknown(column: str) -> bool:
-    """True if a column may contain heights: its header is not a number, an index or a result."""
-    return not (column.isdecimal() or is_index(column) or bare(column).lower() in RESULTS)
+#: Largest number of columns that a message names; largest difference of a last row from the means
+#: or sums of the other rows, over the range of each column, if it contains those.
+MOST_NAMED, ROUNDED = 5, 1e-3
 
 
 def read_summits(
@@ -43,14 +35,18 @@ def read_summits(
     """
     table = read_table(path, required=("x", "y"), optional=("height", "tip_radius"), how=how)
     columns = table.columns
-    unread = [it for it, cells in table.others.items() if cells.dtype.kind == "f" and unknown(it)]
-    if "height" not in columns and unread:
-        some = [shortened(it) for it in unread[:MOST_NAMED]]
-        named = 'columns = {height = "' + some[0] + '"} in [asperities], or no such column'
-        if "depth" in some[0].lower():
+    unread = [
+        shortened(name)
+        for name, cells in table.others.items()
+        if cells.dtype.kind == "f"
+        and not (name.isdecimal() or is_index(name) or bare(name).lower() in RESULTS)
+    ]
+    if "height" not in columns and unread:  # one of them may contain heights
+        some, more = ", ".join(unread[:MOST_NAMED]), ", ..." if len(unread) > MOST_NAMED else ""
+        named = f'columns = {{height = "{unread[0]}"}} in [asperities], or no such column'
+        if "depth" in unread[0].lower():
             named = "which grows towards the sphere: write depths as negative heights"
-        more = ", ..." if len(unread) > MOST_NAMED else ""
-        raise InputError("columns", found=f"{', '.join(some)}{more}, but no height",
+        raise InputError("columns", found=f"{some}{more}, but no height",
                          expected=f"a column height; {named}", where=str(path))  # fmt: skip
     for name, said in table.units.items():
         if parsed(said) and not how.units.length:

@@ -8,7 +8,7 @@ from typing import Any
 
 from convexrough.compare import CARRIES, Comparison, Entry
 from convexrough.run.results import headed
-from convexrough.run.stage import Summary, unit_of
+from convexrough.run.stage import Summary, numbers, unit_of
 from convexrough.run.stages.normal import COUNTS
 from convexrough.tabular.columns import aligned, bound
 from convexrough.tabular.units import UnitNames
@@ -32,25 +32,18 @@ def _entry(entry: Entry) -> Summary:
             "different_contacts", "memory")  # fmt: skip
     row: Summary = {name: getattr(entry, name) for name in said}
     if (contact := entry.contact) is not None:
-        proof = contact.certificate
-        row |= {status: int((contact.status == status).sum()) for status in COUNTS}
-        row |= {"approach": contact.approach, "load": contact.load}
+        row |= numbers(contact, (*COUNTS, "approach", "load"))
         row |= {"largest_load": float(contact.loads.max())}
-        row |= {name: getattr(proof, name) for name in ("scope", "load_error", "duality_gap")}
-        names = ("iterations", "seconds", "influence")
-        row |= {name: getattr(contact, name) for name in names}
+        row |= numbers(contact, ("scope", "load_error", "duality_gap"))
+        row |= numbers(contact, ("iterations", "seconds", "influence"))
     return row
 
 
 def steps(comparison: Comparison) -> list[list[Any]]:
     """A table of the logged iterations of solvers: headings, then a row for each iteration."""
     names = ["step", "objective", "residual"]
-    rows = [
-        [entry.solver, *(step[name] for name in names)]
-        for entry in comparison.entries
-        for step in entry.steps
-    ]
-    return [["solver", *names], *rows]
+    steps = [(entry.solver, step) for entry in comparison.entries for step in entry.steps]
+    return [["solver", *names], *([solver, *(it[name] for name in names)] for solver, it in steps)]
 
 
 def describe_comparison(summary: Summary, units: UnitNames) -> list[str]:
@@ -103,11 +96,9 @@ def comparison_warnings(summary: Summary) -> Iterator[str]:
         )
     for row in rows:
         if count := row["different_contacts"]:
-            yield (
-                f"{row['solver']}: {count} contacts differ from those of {rows[0]['solver']}: one "
-                f"solver gives them more than {CARRIES:g} of the largest load, the other less than "
-                f"{CARRIES / 10:g}"
-            )
+            differ = f"{count} contacts differ from those of {rows[0]['solver']}"
+            most = f"one solver gives them more than {CARRIES:g} of the largest load"
+            yield f"{row['solver']}: {differ}: {most}, the other less than {CARRIES / 10:g}"
     yield from (f"{it['solver']}: {it['outcome']}" for it in rows if it["outcome"] != "answered")
     answered = [row for row in rows if row["outcome"] == "answered"]
     if not any(row["scope"] != "none" and not row["undecided"] for row in answered):

@@ -1,10 +1,9 @@
 """Results as a summary, as a proof and as files, and the folder to which they are written.
 
-The new files are written to a temporary folder, which is then renamed. If a folder of the final
-name exists already, the complete new files are moved to this folder one by one, `files.json` last.
-A folder with contents is accepted only with `force`. Before the move, `files.json` of the earlier
-run is deleted, then all files listed there. Other files stay. If the process dies during the move,
-the folder contains only some of the new files, and no `files.json`.
+The new files are written to a temporary folder, which is then renamed, or, if the final folder
+exists already, moved into it one by one, `files.json` last. Before the move, `files.json` of the
+earlier run is deleted, then all files listed there. Other files stay. If the process dies during
+the move, the folder contains only some of the new files, and no `files.json`.
 """
 
 from __future__ import annotations
@@ -16,6 +15,7 @@ import platform
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -36,11 +36,9 @@ if TYPE_CHECKING:
 
     from convexrough.proof import Proof
 
-#: Version of the keys of summary.json and of the columns of tables.
-SCHEMA = 2
-
-#: Tables with more rows than this are written as .npz.
-MOST_CSV_ROWS = 100_000
+#: Version of the keys of summary.json and of the columns of tables; the largest number of rows of a
+#: table that is not written as .npz.
+SCHEMA, MOST_CSV_ROWS = 2, 100_000
 
 #: The file that lists the files written and, for some commands, files read and versions.
 MANIFEST = "files.json"
@@ -66,15 +64,11 @@ def summarise(results: Iterable[Result]) -> Summary:
 
 
 def prove_results(results: Sequence[Result], warn: Callable[[str], None]) -> Proof:
-    """The proof of the contact and of its states under shear.
+    """The proof of the contact and of its states under the shear forces of the results.
 
-    warn : called for each state that is left out, with the reason
-
-    The shear forces are those of the results, and the amplitudes of cycles, except 0 and forces of
-    at least `BELOW_LIMIT` f P. States that are not proved are left out.
-
-    Raises InputError for scenes too large for exact arithmetic, ProofError if the contact is not
-    proved.
+    Forces of 0 or of at least `BELOW_LIMIT` f P are left out, and states that are not proved; for
+    each of these `warn` is called with the reason. Raises InputError for scenes too large for exact
+    arithmetic, ProofError if the contact is not proved.
     """
     contact = results[0].contact
     most = BELOW_LIMIT * limit(contact) if contact.scene.friction else 0.0
@@ -95,25 +89,24 @@ def prove_results(results: Sequence[Result], warn: Callable[[str], None]) -> Pro
     return contact.proof(sheared=good)
 
 
+@dataclass
 class Writer:
-    """A folder of results that receives files.
+    """A folder of results that receives files. All methods raise FileError.
 
     folder  : the final folder;  path : the temporary folder;  files : the files written so far
     formats : file name extensions of figures;  dpi : pixels per inch of figures
-
-    All methods raise FileError if a file cannot be written.
     """
 
-    def __init__(self, folder: Path, path: Path, formats: Sequence[str], dpi: int) -> None:
-        self.folder, self.path, self.formats, self.dpi = folder, path, formats, dpi
-        self.files: list[Path] = []
+    folder: Path
+    path: Path
+    formats: Sequence[str] = ("png",)
+    dpi: int = 200
+    files: list[Path] = field(default_factory=list)
 
     def text(self, name: str, text: str | bytes) -> None:
-        """Write a text, or bytes."""
         self.files.append(write_text(self.path / name, text))
 
     def summary(self, name: str, summary: Summary) -> None:
-        """Write a summary as JSON."""
         self.text(name, to_json(summary) + "\n")
 
     def tables(self, tables: Mapping[str, Mapping[str, Any]]) -> None:
@@ -142,10 +135,7 @@ class Writer:
     def results(
         self, results: Sequence[Result], *, figures: bool, more: Mapping[str, Any] | None = None
     ) -> None:
-        """Write summary.json with `more` added, all tables and, if `figures` is true, figures.
-
-        All contents are computed before the first file is written.
-        """
+        """Compute all contents; write summary.json with `more`, tables and perhaps figures."""
         tables = [result.tables() for result in results]
         plotted = [result.figures() for result in results] if figures else []
         self.summary("summary.json", summarise(results) | dict(more or {}))
@@ -163,37 +153,34 @@ def results_folder(
     *,
     force: bool,
     reads: Iterable[str | Path] = (),
+    command: str = "",
     formats: Sequence[str] = ("png",),
     dpi: int = 200,
-    command: str = "",
     **said: Any,
 ) -> Iterator[Writer]:
-    """A context manager that yields the writer of a new temporary folder.
-
-    If the `with` block ends without an error, the temporary folder is renamed to `folder`; if
-    `folder` exists, the files are moved into it.
+    """A context manager that yields a writer; its files are in `folder` if the body succeeds.
 
     force : True to accept a folder with contents; results of another command are refused even then
     reads : files that the block reads; they must not be in `folder`
-    formats, dpi : as for `Writer`;  command : the command that writes, an entry of `files.json`
-    said  : further entries of `files.json`
+    formats, dpi : as for `Writer`;  command, said : entries of `files.json`
 
     Raises FileError, before the block runs, if `folder` cannot be written or replaced, or if it has
     a damaged `files.json`.
     """
-    new = unfinished(folder / "results" if folder.is_dir() else folder)
+    there = folder.is_dir()
+    new = unfinished(folder / "results" if there else folder)
     parents = [each for each in folder.parents if not each.exists()]
     with file_errors(folder, "hold results"):
         folder.parent.mkdir(parents=True, exist_ok=True)
-        remove_unfinished(folder if folder.is_dir() else folder.parent)
-        if folder.exists() and not folder.is_dir():
+        remove_unfinished(folder if there else folder.parent)
+        if folder.exists() and not there:
             raise FileExistsError(17, "File exists")
         for each in reads:
             # For a link these are its own folder and that of its target.
             places = {Path(each).resolve().parent, Path(each).parent.resolve()}
             if folder.resolve() in places:
                 raise FileError(f"{folder}: holds {Path(each).name}, an input; name another folder")
-        if folder.is_dir() and any(folder.iterdir()) and not force:
+        if there and any(folder.iterdir()) and not force:
             advice = "--force replaces its results; or name another folder"
             raise FileError(f"{folder}: not empty; {advice}")
         refuse_others(folder, command)
@@ -202,21 +189,17 @@ def results_folder(
             yield Writer(folder, new, formats, dpi)
             names = sorted(path.name for path in new.iterdir())
             write_text(new / MANIFEST, to_json(headed(files=names, command=command, **said)) + "\n")
-            _moved(new, folder)
+            if folder.is_dir():
+                remove_earlier(folder)
+                for path in sorted(new.iterdir(), key=lambda path: path.name == MANIFEST):
+                    os.replace(path, folder / path.name)
+            else:
+                os.replace(new, folder)
         finally:
             shutil.rmtree(new, ignore_errors=True)
             for each in parents:
                 with suppress(OSError):  # not empty: it holds results
                     each.rmdir()
-
-
-def _moved(new: Path, folder: Path) -> None:
-    if not folder.is_dir():
-        os.replace(new, folder)
-        return
-    remove_earlier(folder)
-    for path in sorted(new.iterdir(), key=lambda path: path.name == MANIFEST):
-        os.replace(path, folder / path.name)
 
 
 def refuse_others(folder: Path, command: str) -> None:
@@ -247,8 +230,8 @@ def _manifest(folder: Path) -> dict[str, Any]:
         found = json.loads(path.read_text(encoding="utf-8"))
         if isinstance(found, dict) and isinstance(found.get("files"), list):
             return found
-    expected = "the list of the files of an earlier run"
-    raise FileError(f"{path}: damaged, expected {expected}; remove it or name another folder")
+    expected = "expected the list of the files of an earlier run; remove it or name another folder"
+    raise FileError(f"{path}: damaged, {expected}")
 
 
 def origin(source: SceneFile) -> Summary:
@@ -264,16 +247,6 @@ def origin(source: SceneFile) -> Summary:
 def versions() -> dict[str, str]:
     """The versions of the packages in `NUMERICAL`, by name."""
     return {name: metadata.version(name) for name in NUMERICAL}
-
-
-def slider_page(pressed: Result) -> str:
-    """An HTML page with a slider for the shear force, and the friction states computed for it.
-
-    Raises InputError if the scene has no friction, or another shape than a sphere.
-    """
-    from convexrough.plots.slider import slider_html  # imported only if a page is requested
-
-    return slider_html(pressed.contact, pressed.lines())
 
 
 def write_rows(path: Path, rows: Iterable[Iterable[Any]]) -> Path:

@@ -32,17 +32,12 @@ if TYPE_CHECKING:
     from convexrough.run.stage import Result, Stage
     from convexrough.run.study import LatticeTable, Study
 
-#: Largest number of mistakes in a scene file that are listed; the other mistakes are counted.
-MOST_MISTAKES = 50
-
-#: [bytes] size of the largest accepted scene file.
-MOST_BYTES = 2**25
+#: Largest number of mistakes in a scene file that are listed, largest size of the file in bytes,
+#: and largest number of parts of a dotted key: time and memory of tomllib grow with its square.
+MOST_MISTAKES, MOST_BYTES, MOST_PARTS = 50, 2**25, 100
 
 #: Columns of a file of asperities, unless the scene file names others.
 SUMMIT_COLUMNS = ("x", "y", "height", "tip_radius")
-
-#: Largest number of parts of a dotted key: time and memory of tomllib grow with its square.
-MOST_PARTS = 100
 
 _DOTTED = re.compile(rf"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){{{MOST_PARTS}}}")
 
@@ -61,13 +56,8 @@ class Task(Record):
 
     def problem(self) -> NormalProblem:
         """The normal contact problem, which solvers take. Raises InputError."""
-        return NormalProblem.assemble(
-            self.scene,
-            approach=self.approach,
-            load=self.load,
-            influence=self.influence,
-            highest=self.highest_approach,
-        )
+        how: Any = {"influence": self.influence, "highest": self.highest_approach}
+        return NormalProblem.assemble(self.scene, approach=self.approach, load=self.load, **how)
 
     def press(self) -> Contact:
         """The contact under the prescribed approach or load, as found by `solver`.
@@ -219,9 +209,7 @@ def has_sweep(path: Path) -> bool:
     return bool(re.search(r"^\s*\[\s*sweep\b", text, re.M)) and "sweep" in tables_of(path, text)
 
 
-def regular(
-    pattern: str, spacing: float, tip_radius: float | tuple[float, ...], within: float
-) -> Asperities:
+def regular(pattern: str, spacing: float, tip_radius: Any, within: float) -> Asperities:
     """Asperities in the pattern "hexagonal" or "square", without random heights or tip radii."""
     make = Asperities.hexagonal if pattern == "hexagonal" else Asperities.square
     return make(spacing=spacing, tip_radius=tip_radius, within=within)
@@ -235,40 +223,30 @@ def task_of(
     summits: Callable[..., Asperities] = read_summits,
     lattice: Callable[..., Asperities] = regular,
 ) -> Task:
-    """The scene and the stages described by tables that have been checked.
+    """The scene and the stages described by the checked tables of the scene file at `path`.
 
-    path    : the scene file, for messages; paths in the tables are relative to its folder
     asperities : asperities that replace those of the tables
-    summits, lattice : functions that make the asperities, with the arguments of `read_summits` and
-        `regular`
+    summits, lattice : functions like `read_summits` and `regular`, which make the asperities
 
     Raises InputError for mistakes that the tables alone do not show.
     """
+    layout, units, highest = study.asperities, study.units, None
     with blamed_on(path, "material", unless_known=True):
         stuff = study.material.made()
+    how: Any = {"friction": study.friction.coefficient if study.friction else None}
+    how |= {"geometry": layout.geometry, "units": units.names}
 
     def press_on(asperities: Asperities) -> Scene:
-        return Scene(
-            checked(study.sphere.radius),
-            asperities,
-            stuff,
-            friction=study.friction.coefficient if study.friction else None,
-            geometry=study.asperities.geometry,
-            units=study.units.names,
-        )
+        return Scene(checked(study.sphere.radius), asperities, stuff, **how)
 
-    layout, highest = study.asperities, None
     with blamed_on(path, "asperities", unless_known=True):
         if asperities is not None:
             scene = press_on(asperities)
         elif layout.pattern == "file":
-            how = Reading(
-                columns=named_columns("columns", layout.columns, SUMMIT_COLUMNS),
-                units=study.units.names,
-                convert=study.units.convert,
-            )
+            columns = named_columns("columns", layout.columns, SUMMIT_COLUMNS)
+            manner = Reading(columns=columns, units=units.names, convert=units.convert)
             place = path.parent / layout.path
-            scene = press_on(summits(place, tip_radius=layout.tip_radius, how=how))
+            scene = press_on(summits(place, tip_radius=layout.tip_radius, how=manner))
         else:
             scene, highest = _lattice(layout, study, press_on, lattice)
     return Task(
@@ -290,37 +268,36 @@ def _lattice(
 ) -> tuple[Scene, float | None]:
     """The scene with asperities in a pattern, and `highest_approach` of the task.
 
-    The pattern extends to the distance `within` or, without this key, to all asperities that could
-    touch at the approach or load in [normal], or at the largest load in another table.
+    Without the key `within`, the pattern has all asperities that could touch at the approach or
+    load in [normal], or at the largest load in another table.
     """
-    tips = layout.tip_radius
+    tips, deviation, variation = layout.tip_radius, layout.height_std, layout.tip_radius_cv
+    rough: Any = {"height_std": deviation, "tip_radius_cv": variation, "seed": layout.seed}
     tip_radius = tuple(tips) if isinstance(tips, list) else tips
 
     def scene(within: float) -> Scene:
         asperities = lattice(layout.pattern, layout.spacing, tip_radius, within)
-        rough = asperities.roughened(
-            height_std=layout.height_std, tip_radius_cv=layout.tip_radius_cv, seed=layout.seed
-        )
-        return press_on(rough)
+        return press_on(asperities.roughened(**rough))
 
     def farthest(approach: float) -> float:
         return reach(
             approach,
             sphere_radius=checked(study.sphere.radius),
-            tip_radius=largest_tip_radius(layout.tip_radius, layout.tip_radius_cv),
-            height=CUT_DEVIATIONS * layout.height_std,
+            tip_radius=largest_tip_radius(tips, variation),
+            height=CUT_DEVIATIONS * deviation,
             geometry=layout.geometry,
         )
 
     if layout.within is not None:
         return scene(layout.within), None
     approach, load = study.normal.approach, study.normal.load or 0.0
-    found: list[tuple[Scene, float | None]] = []
+    found: tuple[Scene, float | None]
     if approach is not None:
-        found.append((scene(farthest(approach)), None))
+        found = scene(farthest(approach)), None
     else:
-        found.append(all_that_could_touch(scene, farthest, load))
-    most = max((stage.highest_load for stage in study.stages.values()), default=0.0)
+        found = all_that_could_touch(scene, farthest, load)
+    most = max(stage.highest_load for stage in study.stages.values())
     if most > load:
-        found.append((all_that_could_touch(scene, farthest, most)[0], None))
-    return max(found, key=lambda each: len(each[0]))
+        larger, _ = all_that_could_touch(scene, farthest, most)
+        found = (larger, None) if len(larger) > len(found[0]) else found
+    return found

@@ -1,17 +1,16 @@
-"""Base classes of stages and of their results.
+"""Base classes of stages and of their results; docs/architecture.md has an example of 40 lines.
 
 A stage is a table of the scene file that requests a result. Its class checks the keys, and computes
 the result from a pressed contact. Summary, tables, figures and printed lines are derived from the
-result. A new stage needs a subclass of `Stage` and one of `Result` in a file of `run/stages`, and
-an entry in `STAGES`; docs/architecture.md has an example of 40 lines.
+result.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,8 +32,7 @@ Columns = dict[str, NDArray[Any]]
 Summary = dict[str, Any]
 Labels = Mapping[str, Sequence[float]]
 
-#: Statuses of asperities. In rows of results, the name of a status stands for the number of
-#: asperities that have it.
+#: Statuses of asperities; as a name in a row of a result, the number of asperities that have it.
 STATUSES = ("contact", "open", "stuck", "partial", "sliding", "intermittent", "undecided")
 
 #: Names of numbers in results and of keys of scene files, by physical dimension; other numbers are
@@ -55,7 +53,7 @@ KIND = {name: kind for kind, names in KINDS.items() for name in names}
 #: factor FAR, or if its largest shear force is below the fraction SLIGHT of the friction limit.
 FAR, SLIGHT = 100.0, 2e-3
 
-#: Largest number of printed rows of a table of steps: the last rows are printed.
+#: Largest number of printed rows of a table of steps.
 MOST_PRINTED = 20
 
 
@@ -121,43 +119,38 @@ def limit(contact: Contact) -> float:
     return checks.friction(contact.scene.friction) * contact.load
 
 
-def same(*names: str) -> dict[str, str]:
-    """Headings of printed columns: for each number its own name."""
-    return {name: name for name in names}
+def heads(columns: str) -> Mapping[str, str]:
+    """Headings of printed columns by key, from a text such as "fraction: Q/(fP), force"."""
+    parts = (column.partition(": ") for column in columns.split(", "))
+    return {name: heading or name for name, _, heading in parts}
 
 
 def number(found: Any, name: str) -> Any:
-    """If `name` is a status, the number of asperities with it; otherwise the attribute `name`.
-
-    The attribute is that of `found`, or of `found.certificate` if `found` has no such attribute.
-    """
+    """The attribute `name` of `found` or of its certificate; for a status, its count."""
     if name in STATUSES:
         return (found.status == name).sum(axis=-1)
     return getattr(found if hasattr(found, name) else found.certificate, name)
 
 
-def numbers_of(found: Any, names: Sequence[str]) -> Summary:
-    """For each of these names the result of `number`, as a Python number or list."""
-    return {name: plain(number(found, name)) for name in names}
+def numbers(found: Any, names: Iterable[str]) -> Summary:
+    """For each of these names the result of `number`, as a Python number or text."""
+    values = ((name, number(found, name)) for name in names)
+    return {name: it.item() if isinstance(it, np.generic) else it for name, it in values}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Result(Record):
     """The result of a stage. Summary, tables and printed lines are derived from its `rows`.
 
-    stage   : the stage that was computed
-    contact : the pressed contact
-    found   : objects such as ShearState, one for each row, or one object with arrays along steps
-
-    Subclasses set `printed` (headings of the printed columns, by key), `title` (of the printed
-    table), `digits` (of printed numbers) and `steps` (True if rows are steps; then only the last
-    ones are printed).
+    found : objects such as ShearState, one for each row, or one object with arrays along steps
+    printed, title : headings of the printed columns, by key, and of the printed table
+    digits, most   : of printed numbers; largest number of printed rows, which are the last ones
     """
 
     printed: ClassVar[Mapping[str, str]] = {}
     title: ClassVar[str] = ""
     digits: ClassVar[int] = 7
-    steps: ClassVar[bool] = False
+    most: ClassVar[int | None] = None
 
     stage: Stage
     contact: Contact
@@ -168,18 +161,12 @@ class Result(Record):
         """Name of the table in the scene file, of the key in summary.json, and of the CSV file."""
         return self.stage.name
 
-    @property
-    def units(self) -> UnitNames:
-        """The names of the scene's units."""
-        return self.contact.scene.units
-
     def rows(self) -> list[Summary]:
-        """Rows of numbers and texts by key; by default one row for each object in `found`."""
-        labels = self.stage.labels
+        """Rows of numbers and texts by key, one for each object in `found`; one without labels."""
+        labels, names = self.stage.labels, self.stage.numbers
         return [
-            {name: values[k] for name, values in labels.items()}
-            | numbers_of(each, self.stage.numbers)
-            for k, each in enumerate(self.found)
+            {name: values[k] for name, values in labels.items()} | numbers(each, names)
+            for k, each in enumerate(self.found if labels else self.found[:1])
         ]
 
     @cached_property
@@ -223,7 +210,12 @@ class Result(Record):
 
     def tables(self) -> dict[str, Columns]:
         """The tables to write: for each file name without its ending, the columns by name."""
-        return {self.name: columns_of(self.known)}
+        rows = self.known
+        return {self.name: {key: np.array([row[key] for row in rows]) for key in rows[0]}}
+
+    def at_asperities(self, columns: Columns) -> Columns:
+        """A table with a row for each asperity: its position x and y, and these columns."""
+        return dict(zip("xy", self.contact.scene.asperities.positions.T, strict=True)) | columns
 
     def stacked(self, tables: Sequence[Columns]) -> Columns:
         """The tables of all rows one below the other, with the labels of the rows in front."""
@@ -232,26 +224,22 @@ class Result(Record):
         return left | {name: np.concatenate([each[name] for each in tables]) for name in tables[0]}
 
     def figures(self) -> Mapping[str, Figure]:
-        """The figures to write, by the file name without its ending.
-
-        `plots` imports matplotlib when it draws the first one.
-        """
+        """The figures to write, by the file name without its ending."""
         return {}
 
     def lines(self) -> list[str]:
         """The printed lines: a table and, where it matters, what is proved about order."""
-        most = MOST_PRINTED if self.steps else len(self.known)
-        said = self.printed_table(self.name, self.known, self.headings(), self.title, most)
+        said = self.printed_table(self.name, self.known, self.headings(), self.title)
         proved = ", ".join(sorted(self.orders))
         return [*said, *([f"indentations increase with the load: {proved}"] if proved else [])]
 
     def printed_table(
-        self, name: str, rows: list[Summary], printed: Mapping[str, str], title: str, most: int
+        self, name: str, rows: list[Summary], printed: Mapping[str, str], title: str
     ) -> list[str]:
-        """The lines of the last `most` rows of a table, with a title and units."""
+        """The lines of the last rows of a table, with a title and units."""
         units = (f"{it} {unit}" for key, it in printed.items()
-                 if (unit := unit_of(key, self.units)))  # fmt: skip
-        named, cut = ", ".join(units), rows[-most:]
+                 if (unit := unit_of(key, self.contact.scene.units)))  # fmt: skip
+        named, cut = ", ".join(units), rows[-(self.most or len(rows)) :]
         said = [f"{title or name}  ({named})" if named else title or name]
         if len(cut) < len(rows):
             said.append(f"(the last {len(cut)} of {len(rows)} rows; all are in the table {name})")
@@ -263,13 +251,12 @@ class Result(Record):
         return self.printed
 
     def plot(self, axes: Axes | None = None, **options: Any) -> Axes:
-        """Draw the main figure of the last object in `found`; return the axes.
+        """Draw the main figure of the last object in `found`, and return the axes.
 
         Raises InputError if there is none, as where no gradient exists.
         """
         checks.some(self.name, self.found)
-        axes = self.found[-1].plot(axes, **options)
-        return axes
+        return cast("Axes", self.found[-1].plot(axes, **options))
 
     def to_dataframe(self) -> pandas.DataFrame:
         """The first table as a pandas DataFrame. Raises InputError if there is none."""
@@ -280,7 +267,7 @@ class Result(Record):
 class Steps(Result):
     """The result of a stage with consecutive steps, as one object with arrays along the steps."""
 
-    steps = True
+    most = MOST_PRINTED
 
     def rows(self) -> list[Summary]:
         (found,) = self.found
@@ -300,23 +287,10 @@ class Steps(Result):
         return lists | {"order": self.found[0].order}
 
 
-def plain(value: Any) -> Any:
-    """The value; a NumPy number as a Python number, an array as a list."""
-    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
-
-
-def columns_of(rows: Sequence[Summary]) -> Columns:
-    return {key: np.array([row[key] for row in rows]) for key in rows[0]} if rows else {}
-
-
 def unit_of(name: str, units: UnitNames) -> str:
     """The unit of the number with this name; "" if it has none or the scene names no units."""
     length, force = units.length, units.force
-    both = length and force
-    return {
-        "length": length,
-        "force": force,
-        "area": f"{length}²" if length else "",
-        "work": f"{force} {length}" if both else "",
-        "stiffness": f"{force}/{length}" if both else "",
-    }.get(KIND.get(name, ""), "")
+    known = {"length": length, "force": force, "area": length and f"{length}²"}
+    if length and force:
+        known |= {"work": f"{force} {length}", "stiffness": f"{force}/{length}"}
+    return known.get(KIND.get(name, ""), "")

@@ -16,23 +16,10 @@ from pydantic import Discriminator, Field, Tag, ValidationError, create_model
 from convexrough.checks import nearest
 from convexrough.errors import InputError
 from convexrough.influence import KINDS, Kind
+from convexrough.run import values
 from convexrough.run.stage import Stage
 from convexrough.run.stages import STAGES, NormalStage
-from convexrough.run.values import (
-    FileTable,
-    Mistake,
-    NonNegative,
-    Positive,
-    Radius,
-    Ratio,
-    Switch,
-    Text,
-    TipRadius,
-    Variation,
-    Whole,
-    expected,
-    phrased,
-)
+from convexrough.run.values import FileTable, Mistake, NonNegative, Positive, Ratio, Text, expected
 from convexrough.scene.material import Material
 from convexrough.solvers import SOLVERS
 from convexrough.tabular.units import UnitNames, force_of, known_unit, parsed
@@ -46,12 +33,10 @@ Pattern = Annotated[Literal["hexagonal", "square"], expected('"hexagonal", "squa
 
 
 class SphereTable(FileTable):
-    radius: Radius
+    radius: values.Radius
 
 
 class MaterialTable(FileTable):
-    """The table of the material of both bodies."""
-
     alternatives = ("contact_modulus", "youngs_modulus")
     contact_modulus: Positive | None = None
     youngs_modulus: Positive | None = None
@@ -75,8 +60,6 @@ class BodyTable(FileTable):
 
 
 class BodiesTable(FileTable):
-    """The table of two bodies of different materials."""
-
     elsewhere = ("two bodies", frozenset(MaterialTable.model_fields))
     sphere: BodyTable
     base: BodyTable
@@ -85,32 +68,29 @@ class BodiesTable(FileTable):
         return Material.pair(self.sphere.made(), self.base.made())
 
 
-class SummitsTable(FileTable):
-    """The table of asperities that are read from a file."""
+#: Keys of asperities in a pattern that a table of asperities from a file does not have.
+LATTICE = frozenset(("spacing", "within", "height_std", "tip_radius_cv", "seed"))
 
-    elsewhere = (
-        "this pattern",
-        frozenset(("spacing", "within", "height_std", "tip_radius_cv", "seed")),
-    )
+
+class SummitsTable(FileTable):
+    elsewhere = ("this pattern", LATTICE)
     pattern: Literal["file"]
     path: Text
-    tip_radius: TipRadius | None = None
+    tip_radius: values.TipRadius | None = None
     columns: dict[str, Text] = Field(default_factory=dict)
     geometry: Geometry = "closest"
 
 
 class LatticeTable(FileTable):
-    """The table of asperities in a pattern."""
-
     needs: ClassVar[Mapping[str, str]] = {"height_std": "seed", "tip_radius_cv": "seed"}
     elsewhere = ("this pattern", frozenset(SummitsTable.model_fields))
     pattern: Pattern
     spacing: Positive
-    tip_radius: TipRadius
+    tip_radius: values.TipRadius
     within: NonNegative | None = None
     height_std: NonNegative = 0.0
-    tip_radius_cv: Variation = 0.0
-    seed: Whole | None = None
+    tip_radius_cv: values.Variation = 0.0
+    seed: values.Whole | None = None
     geometry: Geometry = "closest"
 
 
@@ -119,17 +99,15 @@ class FrictionTable(FileTable):
 
 
 class SolverTable(FileTable):
-    name: Annotated[str, expected(f"one of: {', '.join(SOLVERS)}", SOLVERS.__contains__)] = "newton"
-    influence: (
-        Annotated[Kind, expected(f"one of: {', '.join(KINDS)}", KINDS.__contains__)] | None
-    ) = None
+    name: Annotated[str, values.one_of(SOLVERS)] = "newton"
+    influence: Annotated[Kind, values.one_of(KINDS)] | None = None
 
 
 class UnitsTable(FileTable):
     length: Text = ""
     force: Text = ""
     pressure: Text = ""
-    convert: Switch = False
+    convert: values.Switch = False
 
     @property
     def names(self) -> UnitNames:
@@ -221,7 +199,7 @@ class Study(FileTable):
             return
         tables: dict[str, Any] = {"material": material}
         if isinstance(material, BodiesTable):
-            tables = {"material.sphere": material.sphere, "material.base": material.base}
+            tables = {f"material.{name}": table for name, table in material}
         for (name, table), key in product(tables.items(), MODULI):
             value = getattr(table, key, None)
             if value and not SOFTEST <= (pascals := value * float(unit.size)) <= HARDEST:
@@ -247,9 +225,8 @@ def _unbounded(lattice: Any, normal: Any, sphere: Any) -> Iterator[Mistake]:
 
 @lru_cache(4)
 def _model(stages: tuple[type[Stage], ...]) -> type[Study]:
-    fields: dict[str, Any] = {
-        each.name: (each | None, None) for each in stages if each is not NormalStage
-    }
+    fields: dict[str, Any]
+    fields = {each.name: (each | None, None) for each in stages if each is not NormalStage}
     return create_model("Study", __base__=Study, **fields)
 
 
@@ -262,9 +239,8 @@ def validate(contents: Mapping[str, Any]) -> tuple[Study | None, list[str]]:
         return model.model_validate(dict(contents)), []
     except ValidationError as error:
         places = {name: place for place, name in enumerate(contents)}
-        errors = sorted(
-            error.errors(), key=lambda each: places.get(str(each["loc"][0]), len(places))
-        )
+        errors = error.errors()
+        errors.sort(key=lambda each: places.get(str(each["loc"][0]), len(places)))
         return None, [_said(model, each) for each in errors]
 
 
@@ -276,7 +252,9 @@ def validate_table(name: str, keys: Any, model: type[T]) -> tuple[T | None, list
     try:
         return model.model_validate(keys), []
     except ValidationError as error:
-        return None, [phrased({**each, "loc": (name, *each["loc"])}) for each in error.errors()]
+        return None, [
+            values.phrased({**each, "loc": (name, *each["loc"])}) for each in error.errors()
+        ]
 
 
 def _said(model: type[Study], error: Any) -> str:
@@ -287,4 +265,4 @@ def _said(model: type[Study], error: Any) -> str:
     if error["type"] == "told" and not inner:
         own = error["msg"]
         return own if table in own.split(":")[0] else f"[{table}]: {own}"
-    return phrased(error)
+    return values.phrased(error)

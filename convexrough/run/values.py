@@ -6,22 +6,11 @@ Only modules that define tables import this one, because pydantic takes 0.1 s to
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Discriminator,
-    Field,
-    ModelWrapValidatorHandler,
-    Tag,
-    ValidationError,
-    ValidatorFunctionWrapHandler,
-    WrapValidator,
-    model_validator,
-)
+import pydantic
+from pydantic import Discriminator, Field, Tag, ValidationError
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
 from convexrough import checks
@@ -37,10 +26,12 @@ MEANT |= {"maximum": "maximum_fraction", "minimum": "minimum_fraction"}  # names
 Mistake = tuple[str, str]
 
 
-def expected(phrase: str, holds: Callable[[Any], bool] = lambda value: True) -> WrapValidator:
+def expected(
+    phrase: str, holds: Callable[[Any], bool] = lambda value: True
+) -> pydantic.WrapValidator:
     """A validator that also requires `holds`; messages end with "expected" and the phrase."""
 
-    def check(value: Any, validated: ValidatorFunctionWrapHandler) -> Any:
+    def check(value: Any, validated: pydantic.ValidatorFunctionWrapHandler) -> Any:
         try:
             if holds(result := validated(value)):
                 return result
@@ -49,11 +40,16 @@ def expected(phrase: str, holds: Callable[[Any], bool] = lambda value: True) -> 
                 raise
         raise PydanticCustomError("expected", "{phrase}", {"phrase": phrase})
 
-    return WrapValidator(check)
+    return pydantic.WrapValidator(check)
+
+
+def one_of(names: Collection[str]) -> pydantic.WrapValidator:
+    return expected(f"one of: {', '.join(names)}", names.__contains__)
 
 
 #: The type of a value in the file, "(list)" or "(number)"; messages omit tags in brackets.
-NUMBER_OR_LIST = Discriminator(lambda it: "(list)" if isinstance(it, list) else "(number)")
+_EITHER = Discriminator(lambda it: "(list)" if isinstance(it, list) else "(number)")
+_ONE, _LIST = Tag("(number)"), Tag("(list)")
 
 _SIZED = expected(SIZED, is_sized)
 
@@ -66,58 +62,58 @@ Share = Annotated[float, expected("a number from 0 to 1", lambda value: 0 <= val
 Fraction = Annotated[float, expected("a number from -1 to 1", lambda value: -1 <= value <= 1)]
 Phase = Annotated[float, expected(*checks.phase)]
 #: A single number in the file stands for a list of this number.
-ALSO_ONE = BeforeValidator(lambda it: [it] if isinstance(it, (int, float)) else it)
+ALSO_ONE = pydantic.BeforeValidator(lambda it: [it] if isinstance(it, (int, float)) else it)
 Shares = Annotated[list[Share], expected("a list of numbers from 0 to 1", bool), ALSO_ONE]
 Fractions = Annotated[list[Fraction], expected("a list of numbers from -1 to 1", bool), ALSO_ONE]
 Whole = Annotated[int, expected("a whole number that is not negative", lambda value: value >= 0)]
 Text = Annotated[str, expected("text in quotes", bool)]
 Switch = Annotated[bool, expected("true or false")]
-TipRadius = Annotated[
-    Annotated[Positive, Tag("(number)")] | Annotated[list[Positive], Tag("(list)")], NUMBER_OR_LIST
-]
+TipRadius = Annotated[Annotated[Positive, _ONE] | Annotated[list[Positive], _LIST], _EITHER]
 _Length = Annotated[
     float,
     Field(allow_inf_nan=True),
     expected("a positive number, or inf where it is flat", lambda value: value > 0),
     expected(SIZED, lambda value: value == math.inf or is_sized(value)),
 ]
-_TwoLengths = Annotated[
-    list[_Length], expected("two radii, along x and along y", lambda value: len(value) == 2)
-]
-Radius = Annotated[
-    Annotated[_Length, Tag("(number)")] | Annotated[_TwoLengths, Tag("(list)")], NUMBER_OR_LIST
-]
+_Two = expected("two radii, along x and along y", lambda value: len(value) == 2)
+Radius = Annotated[Annotated[_Length, _ONE] | Annotated[list[_Length], _Two, _LIST], _EITHER]
 NUMBER_OR_PAIR = 'a finite number, or with kind = "vector" a pair [x, y] of finite numbers'
 _Pair = Annotated[list[Finite], expected(NUMBER_OR_PAIR, lambda value: len(value) == 2)]
-Force = Annotated[
-    Annotated[Finite, Tag("(number)")] | Annotated[_Pair, Tag("(list)")], NUMBER_OR_LIST
-]
+Force = Annotated[Annotated[Finite, _ONE] | Annotated[_Pair, _LIST], _EITHER]
 
 
-class FileTable(BaseModel):
+class FileTable(pydantic.BaseModel):
     """A table of a file. Infinite numbers, texts in place of numbers, unknown keys are mistakes."""
 
-    model_config = ConfigDict(extra="ignore", strict=True, allow_inf_nan=False, frozen=True)
+    model_config = pydantic.ConfigDict(
+        extra="ignore", strict=True, allow_inf_nan=False, frozen=True
+    )
 
     alternatives: ClassVar[tuple[str, ...]] = ()  # keys of which exactly one is given
     needs: ClassVar[Mapping[str, str]] = {}  # for each key, one required with it
     elsewhere: ClassVar[tuple[str, frozenset[str]]] = ("", frozenset())  # name, keys unused with it
 
-    @model_validator(mode="wrap")
+    @pydantic.model_validator(mode="wrap")
     @classmethod
-    def _all_mistakes(cls, keys: Any, validated: ModelWrapValidatorHandler[Self]) -> Self:
+    def _all_mistakes(cls, keys: Any, validated: pydantic.ModelWrapValidatorHandler[Self]) -> Self:
         """The checked table. Raises ValidationError with all mistakes in values and in keys."""
+
+        def told(key: str, said: str) -> InitErrorDetails:
+            return _detail("told", said, (key,) if key else (), keys)
+
         if not isinstance(keys, dict):
             raise PydanticCustomError("expected", "a table")
         found: list[InitErrorDetails] = []
         try:
             table = validated(keys)
         except ValidationError as error:
-            found += [_again(each) for each in error.errors()]
-        found += [_mistake(*each, keys) for each in cls.mistakes_between(keys)]
-        if not found:
-            found = [_mistake(*each, keys) for each in table.mistakes_within()]
-        if found:
+            for each in error.errors():
+                kind = each["type"] if each["type"] in ("told", "missing") else "expected"
+                said = each["msg"].removeprefix("Input should be ")
+                said = "a table" if each["type"] == "model_type" else said
+                found.append(_detail(kind, said, each["loc"], each["input"]))
+        found += [told(*each) for each in cls.mistakes_between(keys)]
+        if found := found or [told(*each) for each in table.mistakes_within()]:
             raise ValidationError.from_exception_data(cls.__name__, found)
         return table
 
@@ -146,18 +142,10 @@ class FileTable(BaseModel):
         yield from ()
 
 
-def _mistake(key: str, said: str, keys: Any) -> InitErrorDetails:
-    kind = PydanticCustomError("told", "{said}", {"said": said})
-    return InitErrorDetails(type=kind, loc=(key,) if key else (), input=keys)
-
-
-def _again(error: ErrorDetails) -> InitErrorDetails:
-    """The same mistake, in the form that pydantic needs to raise several mistakes at once."""
-    kind = error["type"] if error["type"] in ("told", "missing") else "expected"
-    expects = error["msg"].removeprefix("Input should be ")
-    expects = "a table" if error["type"] == "model_type" else expects
-    again = PydanticCustomError(kind, "{said}", {"said": expects})
-    return InitErrorDetails(type=again, loc=error["loc"], input=error["input"])
+def _detail(kind: str, said: Any, place: tuple[str | int, ...], found: Any) -> InitErrorDetails:
+    """A mistake in the form that pydantic needs to raise several mistakes at once."""
+    error = PydanticCustomError(kind, "{said}", {"said": said})
+    return InitErrorDetails(type=error, loc=place, input=found)
 
 
 def phrased(error: ErrorDetails) -> str:

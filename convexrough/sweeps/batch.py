@@ -24,22 +24,14 @@ from convexrough.version import __version__
 #: Versions of the packages on which the last bits of rows depend.
 VERSIONS = {"convexrough": __version__, "numpy": np.__version__, "scipy": scipy.__version__}
 
-#: Number of layouts (exact positions) of asperities that the cache keeps.
-KEPT = 8
-
-#: The entry of the column `seed` if nothing is random.
-NO_SEED = -1
-
-#: A row of the table: status, message, and measured numbers.
-Row = tuple[str, str, list[float]]
+#: Number of layouts (exact positions) of asperities that the cache keeps; the entry of the column
+#: `seed` if nothing is random.
+KEPT, NO_SEED = 8, -1
 
 
 @dataclass(frozen=True)
 class Tables:
-    """The scenes of the sweep file at `path`; `tables` is this file except its table [sweep].
-
-    Paths in the tables are relative to the folder of the file.
-    """
+    """The scenes of the sweep file at `path`; `tables` is this file except its table [sweep]."""
 
     grid: Grid
     tables: Mapping[str, Any]
@@ -64,7 +56,7 @@ class Tables:
         return found | {"seed": np.array(seeds, dtype=np.int64)}
 
     def part(self, numbers: range) -> Tables:
-        """A source with at least the scenes with these numbers, for a worker."""
+        """A source that has these scenes at least, for a worker."""
         return self
 
     def opened(self) -> Callable[[int], Task]:
@@ -131,15 +123,26 @@ class Batch:
     def __str__(self) -> str:
         return f"{self.numbers[0]} to {self.numbers[-1]}"
 
-    def table(self, rows: Sequence[Row]) -> Columns:
-        """The columns of the table, by name, from its rows."""
-        values = np.array([values for _, _, values in rows], dtype=np.float64)
-        values = values.reshape(len(rows), len(self.columns))
-        found: Columns = {"scene": np.array(self.numbers, dtype=np.int64)}
-        found |= self.source.labels(self.numbers)
-        found["status"] = np.array([status for status, _, _ in rows], dtype=np.str_)
-        found["message"] = np.array([message for _, message, _ in rows], dtype=np.str_)
-        return found | {column.name: values[:, i] for i, column in enumerate(self.columns)}
+    def table(self, rows: Sequence[Measured | str]) -> Columns:
+        """The columns of the table, by name; a row is a text if the scene failed."""
+        values = np.full((len(rows), len(self.columns)), np.nan)
+        statuses, messages = [], []
+        for own, row in zip(values, rows, strict=True):
+            if isinstance(row, str):
+                statuses.append("failed")
+                messages.append(row)
+                continue
+            # nan if this scene does not have a number that the first scene has
+            own[:] = [row.numbers.get((it.number, it.row), np.nan) for it in self.columns]
+            statuses.append("undecided" if row.doubts else "certified")
+            messages.append("; ".join(filter(None, (row.doubts, row.cautions))))
+        return {
+            "scene": np.array(self.numbers, dtype=np.int64),
+            **self.source.labels(self.numbers),
+            "status": np.array(statuses, dtype=np.str_),
+            "message": np.array(messages, dtype=np.str_),
+            **{column.name: values[:, i] for i, column in enumerate(self.columns)},
+        }
 
 
 def compute(batch: Batch) -> tuple[Columns, Mapping[str, str]]:
@@ -149,35 +152,28 @@ def compute(batch: Batch) -> tuple[Columns, Mapping[str, str]]:
     of error bounds: the rounding of matrix products depends on the number of rows. The row of a
     failed scene contains the message of its error.
     """
+    wanted = {column.stage for column in batch.columns}
+
+    def alone(asked: Task) -> Measured:
+        return measured(asked.press(), asked.stages, wanted)
+
     with one_thread():
-        ask, asked, rows = batch.source.opened(), dict[int, Task](), dict[int, Row]()
-        for number in batch.numbers:
-            try:
-                asked[number] = ask(number)
-            except FAILURES as error:
-                rows[number] = _failed(error, batch.columns)
-        known = measured_together(asked, batch.columns)
-        for number, each in asked.items():
-            rows[number] = _row(each, known.get(number), batch.columns)
-    return batch.table([rows[number] for number in batch.numbers]), VERSIONS
+        ask = batch.source.opened()
+        found: dict[int, Any] = {number: _attempt(ask, number) for number in batch.numbers}
+        tasks = {number: it for number, it in found.items() if not isinstance(it, str)}
+        found |= (together := measured_together(tasks, batch.columns))
+        for number, task in tasks.items():
+            if number not in together:
+                found[number] = _attempt(alone, task)
+    return batch.table(list(found.values())), VERSIONS
 
 
-def _row(asked: Task, known: Measured | None, columns: Sequence[Column]) -> Row:
-    """The row of a scene; `known` are its numbers if it was measured together with others."""
+def _attempt(work: Callable[[Any], Any], given: Any) -> Any:
+    """The result of `work`, or the message of an error that means that one scene failed."""
     try:
-        wanted = {column.stage for column in columns}
-        found, unsure, warned = known or measured(asked.press(), asked.stages, wanted)
-        # nan if this scene does not have a number that the first scene has
-        values = [found.get((column.number, column.row), np.nan) for column in columns]
+        return work(given)
     except FAILURES as error:
-        return _failed(error, columns)
-    said = "; ".join(filter(None, (unsure, warned)))
-    return ("undecided" if unsure else "certified"), said, values
-
-
-def _failed(error: Exception, columns: Sequence[Column]) -> Row:
-    said = "; ".join(str(error).splitlines()) or type(error).__name__
-    return "failed", said, [np.nan] * len(columns)
+        return "; ".join(str(error).splitlines()) or type(error).__name__
 
 
 def different(versions: Mapping[str, str]) -> str:

@@ -17,12 +17,9 @@ from convexrough.sweeps.batch import Columns
 #: Quantiles that are drawn: the ends of the two bands and, in the middle, the line.
 AT = (0.05, 0.25, 0.5, 0.75, 0.95)
 
-#: Largest number of combinations of other swept keys that have bands of their own. If there are
-#: more, all rows share one pair of bands.
-MOST_BANDS = 4
-
-#: Number of bins of x, if x has many values.
-BINS = 20
+#: Largest number of combinations of other swept keys that have bands of their own: if there are
+#: more, all rows share one pair of bands. Number of bins of x, if x has many values.
+MOST_BANDS, BINS = 4, 20
 
 #: Colour, line and marker of each band; all differ also in grey.
 LOOKS = ((ROUGH, "-", "o"), (UNSURE, "--", "s"), ("0.25", ":", "^"), ("#4f8a4f", "-.", "D"))
@@ -33,9 +30,8 @@ def draw_quantiles(
 ) -> Axes:
     """Axes with the median, and bands from 5 to 95 % and 25 to 75 %, of rows that did not fail.
 
-    columns : the columns `measured`, `over`, `status` and those of `others`
-    others  : other swept keys that are not random. Up to four combinations of their values have
-        bands of their own; otherwise the legend states the keys and the number of combinations
+    others : other swept keys that are not random. Up to `MOST_BANDS` combinations of their values
+        have bands of their own; otherwise the legend states the number of combinations
     """
     axes = new_axes((0.65 * DOUBLE, 3.0)) if axes is None else axes
     good = columns["status"] != "failed"
@@ -46,7 +42,10 @@ def draw_quantiles(
         axis.get_offset_text().set_fontsize(TICK)
     if failed := int(np.count_nonzero(~good)):
         axes.set_title(f"{failed:,} scenes failed", fontsize=TICK, loc="left")
-    _scale(axes, rows[over])
+    x = rows[over]
+    if len(x) and x.dtype.kind != "U" and x.min() > 0 and x.max() > 30 * x.min():
+        axes.set_xscale("log")
+    axes.margins(x=0.02)
     legend(axes, "above", ncols=2)
     return axes
 
@@ -54,19 +53,17 @@ def draw_quantiles(
 def _bands(columns: Columns, others: Sequence[str]) -> Iterator[tuple[str, Columns]]:
     usual = "median, 25 to 75 %, 5 to 95 %"
     if others:
+        keys = [key.partition(".")[2] for key in others]
         rows = np.array([columns[key] for key in others]).T
         different = np.unique(rows, axis=0)
         if len(different) <= MOST_BANDS:
             for values in different:
                 some = (rows == values).all(axis=1)
-                name = ", ".join(
-                    f"{key.partition('.')[2]} {_short(value)}"
-                    for key, value in zip(others, values, strict=True)
-                )
+                said = (f"{it:g}" if isinstance(it, float) else str(it) for it in values)
+                name = ", ".join(map(" ".join, zip(keys, said, strict=True)))
                 yield name, {key: column[some] for key, column in columns.items()}
             return
-        every = ", ".join(key.partition(".")[2] for key in others)
-        usual += f"\nall {every}: {len(different)} combinations"
+        usual += f"\nall {', '.join(keys)}: {len(different)} combinations"
     yield usual, columns
 
 
@@ -91,13 +88,3 @@ def _grouped(x: Any, y: Array) -> tuple[Any, list[Array]]:
         return different, [y[back == i] for i in range(len(different))]
     bins = np.array_split(np.argsort(x), BINS)
     return np.array([np.median(x[each]) for each in bins]), [y[each] for each in bins]
-
-
-def _scale(axes: Axes, x: Any) -> None:
-    if len(x) and x.dtype.kind != "U" and x.min() > 0 and x.max() > 30 * x.min():
-        axes.set_xscale("log")
-    axes.margins(x=0.02)
-
-
-def _short(value: Any) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)

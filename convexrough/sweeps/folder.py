@@ -48,7 +48,6 @@ class Folder:
         return [part_from(self.manifest, first) for first in firsts]
 
     def file(self, first: int) -> Path:
-        """The file of the part that begins with scene `first`."""
         return self.path / PARTS / f"{first:012d}.parquet"
 
     def write(self, columns: Columns) -> None:
@@ -59,22 +58,14 @@ class Folder:
         write_text(self.file(int(columns["scene"][0])), whole.getvalue())
 
     def read(self, part: range, names: Sequence[str] | None = None) -> Columns:
-        """Some columns of a part, by default all.
-
-        Raises FileError if the part is damaged, or if it contains other scenes than its name says.
-        """
+        """Some columns of a part, by default all. Raises FileError if the part is damaged."""
         pyarrow, parquet = arrow()
         path = self.file(part.start)
         wanted = list(self.manifest["columns"] if names is None else names)
         try:
             # Threads of pyarrow could outlive the interpreter and abort the process.
-            found = parquet.read_table(
-                path,
-                columns=list({"scene", *wanted}),
-                use_threads=False,
-                pre_buffer=False,
-                page_checksum_verification=True,
-            )
+            how = dict(use_threads=False, pre_buffer=False, page_checksum_verification=True)
+            found = parquet.read_table(path, columns=list({"scene", *wanted}), **how)
         except (OSError, pyarrow.ArrowException) as error:
             why = " ".join(str(error).split())
             raise FileError(f"{path}: damaged ({why}); {RESUME} computes it again") from error
@@ -89,8 +80,7 @@ class Folder:
     def missing(self, wanted: list[range], resume: bool) -> tuple[list[range], str]:
         """The parts of `wanted` that are not yet computed, and a message on what was found.
 
-        Damaged parts and unfinished files of these parts are removed. Raises FileError if some of
-        `wanted` exist and `resume` is false.
+        Damaged parts and unfinished files are removed. Raises FileError if a part must not exist.
         """
         known = {part.start for part in self.parts()}
         there = [part for part in wanted if part.start in known]
@@ -100,16 +90,15 @@ class Folder:
                 f"{self.path}: holds {sum(map(len, there)):,} of these {count:,} scenes already; "
                 f"{RESUME} computes the rest, {OVERWRITE} replaces them, {OUT} names another folder"
             )
-        todo, damaged = [], 0
-        for part in wanted:
-            if part.start in known:
-                try:
-                    self.read(part)
-                    continue
-                except FileError:
-                    self.file(part.start).unlink()
-                    damaged += 1
-            todo.append(part)
+        todo, damaged = [part for part in wanted if part.start not in known], 0
+        for part in there:
+            try:
+                self.read(part)
+            except FileError:
+                self.file(part.start).unlink()
+                todo.append(part)
+                damaged += 1
+        todo.sort(key=lambda part: part.start)
         mine = {self.file(part.start).name for part in todo}
         left = 0
         for path in (self.path / PARTS).glob(".*.unfinished"):
@@ -138,12 +127,10 @@ def open_folder(path: Path) -> Folder:
 def make_folder(path: Path, manifest: Mapping[str, Any], *, overwrite: bool = False) -> Folder:
     """The folder of a sweep, created if it does not exist.
 
-    overwrite : remove an earlier sweep in the folder, and files written by `sweep --summary`; other
-        files stay
+    overwrite : remove an earlier sweep, and files of `sweep --summary`; other files stay
 
-    Raises FileError if the folder cannot be written, or contains files but no manifest; without
-    `overwrite`, also if it contains another sweep, or one begun with other versions of packages.
-    Raises ExtraError if pyarrow is not installed.
+    Raises FileError if the folder cannot be written, or contains files but no manifest, or another
+    sweep, or one begun with other versions of packages; ExtraError if pyarrow is not installed.
     """
     arrow()
     with file_errors(path, "hold results"):
@@ -157,12 +144,12 @@ def make_folder(path: Path, manifest: Mapping[str, Any], *, overwrite: bool = Fa
         if not (path / MANIFEST).exists():
             path.mkdir(parents=True, exist_ok=True)
             # Meanwhile another process may write the manifest of this sweep or of another sweep.
-            strangers = [each.name for each in path.iterdir() if each.name not in (PARTS, MANIFEST)]
+            names = [each.name for each in path.iterdir() if each.name not in (PARTS, MANIFEST)]
             orphans = any((path / PARTS).glob("*.parquet"))
-            if strangers := [name for name in strangers if not name.startswith(f".{MANIFEST}")]:
-                raise FileError(
-                    f"{path}: holds {strangers[0]}, but no sweep; {OUT} names another folder"
-                )
+            for name in names:
+                if not name.startswith(f".{MANIFEST}"):
+                    said = f"holds {name}, but no sweep; {OUT} names another folder"
+                    raise FileError(f"{path}: {said}")
             if not (path / MANIFEST).exists():
                 if orphans:  # the manifest, which is written before all parts, was removed
                     raise FileError(
@@ -174,20 +161,15 @@ def make_folder(path: Path, manifest: Mapping[str, Any], *, overwrite: bool = Fa
     folder = open_folder(path)
     there = folder.manifest
     if there["sweep"] != manifest["sweep"]:
+        named = [f"{it['scenes']:,} scenes of {it['source']} by version {it['version']}, "
+                 f"hash {it['sweep'][:16]}" for it in (there, manifest)]  # fmt: skip
         raise FileError(
-            f"{path}: holds another sweep, {_named(there)}; this is {_named(manifest)}; "
+            f"{path}: holds another sweep, {named[0]}; this is {named[1]}; "
             f"{OVERWRITE} replaces it, {OUT} names another folder"
         )
     if other := different(there["versions"]):
         raise FileError(f"{path}: was begun with {other}; rows could differ")
     return folder
-
-
-def _named(manifest: Mapping[str, Any]) -> str:
-    return (
-        f"{manifest['scenes']:,} scenes of {manifest['source']} by version {manifest['version']}, "
-        f"hash {manifest['sweep'][:16]}"
-    )
 
 
 def arrow() -> tuple[Any, Any]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -29,14 +29,14 @@ Law = Literal["uniform", "normal", "lognormal"]
 
 
 def _different(values: Any) -> bool:
-    return bool(values) and len({*map(_hashable, values)}) == len(values)
+    """True for a list in which no value is twice, where 1 and 1.0 are the same."""
 
+    def hashable(value: Any) -> Any:
+        if isinstance(value, (list, tuple)):
+            return tuple(map(hashable, value))
+        return value if type(value) in (int, float) else repr(value)
 
-def _hashable(value: Any) -> Any:
-    """A hashable object for a value of a file; equal for equal values, such as 1 and 1.0."""
-    if isinstance(value, (list, tuple)):
-        return tuple(map(_hashable, value))
-    return value if type(value) in (int, float) else repr(value)
+    return bool(values) and len({*map(hashable, values)}) == len(values)
 
 
 def _are_seeds(seeds: int | list[int]) -> bool:
@@ -76,11 +76,9 @@ _KEYS = expected('a table of keys of the scene file, such as "asperities.height_
 class Grid(FileTable):
     """The table [sweep]: keys "table.key" of a scene file that vary, and numbers to measure.
 
-    measure  : names of numbers
-    seeds    : number of seeds (of random heights, tip radii and values), or a list of seeds
-    together : keys with lists of the same length; scenes use the k-th value of every list
-    over     : keys with lists; scenes use every combination of their values
-    draw     : keys with random values, and the laws of these values
+    seeds : number of seeds (of random heights, tip radii and values), or a list of seeds
+    together, over, draw : keys with lists of the same length; with lists that are combined in all
+        ways; with laws of random values
     """
 
     measure: _Names = Field(default_factory=list)
@@ -91,7 +89,6 @@ class Grid(FileTable):
 
     @classmethod
     def mistakes_between(cls, keys: Mapping[str, Any]) -> Iterator[Mistake]:
-        """Mistakes: keys that cannot be swept or are swept twice, and lists of unequal length."""
         yield from super().mistakes_between(keys)
         if "measure" not in keys:
             yield "measure", f"missing, expected {_NAMES}"
@@ -134,11 +131,14 @@ class Grid(FileTable):
         return [*self.axes, *self.draw]
 
     @property
+    def numbered(self) -> Sequence[int | None]:
+        """The seeds in their order; only None if nothing is random."""
+        return range(self.seeds) if isinstance(self.seeds, int) else self.seeds or [None]
+
+    @property
     def each(self) -> int:
         """The number of scenes that differ only in the seed."""
-        if isinstance(self.seeds, int):
-            return self.seeds
-        return 1 if self.seeds is None else len(self.seeds)
+        return len(self.numbered)
 
     @property
     def count(self) -> int:
@@ -149,8 +149,7 @@ class Grid(FileTable):
     def point(self, number: int) -> tuple[dict[str, Any], int | None]:
         """The values of the swept keys in scene `number`, counted from 0; and its seed, or None."""
         number, turn = divmod(number, self.each)
-        seeds = range(self.seeds) if isinstance(self.seeds, int) else self.seeds
-        seed = None if seeds is None else seeds[turn]
+        seed = self.numbered[turn]
         found: dict[str, Any] = {}
         for key, values in reversed(self.over.items()):
             number, turn = divmod(number, len(values))
@@ -202,8 +201,5 @@ def table_in(tables: Mapping[str, Any], name: str) -> dict[str, Any]:
 
 
 def swept(table: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Pairs (table, key) of all swept keys of [sweep], which may contain mistakes.
-
-    table : "together", "over" or "draw"
-    """
+    """Pairs (table in `WHERE`, key) of all swept keys of [sweep], which may contain mistakes."""
     return [(where, key) for where in WHERE for key in table_in(table, where)]

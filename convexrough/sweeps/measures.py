@@ -57,11 +57,7 @@ class Column(NamedTuple):
 
 
 class Measured(NamedTuple):
-    """The measured numbers of a scene, with warnings.
-
-    doubts   : reasons why the numbers are not certified, or ""
-    cautions : reasons why the model may fail, or ""
-    """
+    """The measured numbers of a scene, why they are not certified, and why the model may fail."""
 
     numbers: Numbers
     doubts: str
@@ -77,7 +73,7 @@ def measured(contact: Contact, stages: Stages, wanted: Container[str]) -> Measur
         if name in wanted or name == "normal":
             cautions += stage.cautions(contact)
             result = stage.compute(contact)
-            found |= dict(_numbers(result.summary(), name, "", [*stage.labels]))
+            found |= _numbers(result.summary(), name, "", [*stage.labels])
             doubts += result.doubts()
     if ONSET in wanted:
         which = np.flatnonzero(contact.loads)
@@ -111,20 +107,17 @@ def row_label(ends: Sequence[float]) -> str:
 def chosen(contact: Contact, stages: Stages, measures: Sequence[str]) -> tuple[Column, ...]:
     """The columns for each name in `measures`. A name stands for the first number that has it.
 
-    Stages are computed in their order until all names are found. Raises InputError for a name that
-    no number has.
+    Stages are computed until all names are found. Raises InputError for a name of no number.
     """
     rows: dict[str, list[str]] = {}
 
     def number(name: str) -> str:
         return next((each for each in rows if f".{each}".endswith(f".{name}")), "")
 
-    for stage in (*stages, *((ONSET,) if ONSET in measures else ())):
+    for stage in (*stages, *({ONSET} & {*measures})):
         if not all(map(number, measures)):
-            new = measured(
-                contact, {stage: stages[stage]} if stage in stages else {}, {stage}
-            ).numbers
-            for each, row in new:
+            only = {stage: stages[stage]} if stage in stages else {}
+            for each, row in measured(contact, only, {stage}).numbers:
                 rows.setdefault(each, []).append(row)
     columns = []
     for name in measures:
@@ -146,16 +139,13 @@ def unit(name: str, units: UnitNames) -> str:
 #: Arrays with an entry or a row for each scene, by their names in `Contacts` or `Cycles`.
 Found = Mapping[str, Array]
 
-
-def _count(status: str) -> Callable[[Found], Array]:
-    return lambda found: (found["status"] == status).sum(axis=1)
-
-
 #: Numbers of summaries, as functions of the arrays of `Contacts` and `Cycles` and four others:
 #: "amplitudes" (of force), "moved" (displacement amplitudes, nan if not proved), "scales" (W0 of
 #: `Cycle.loss_normalised`) and "smooth" (losses of smooth spheres / W0).
 NORMAL: dict[str, Callable[[Found], Array]] = {
-    **{name: _count(name) for name in ("contact", "open", "undecided")},
+    "contact": lambda found: (found["status"] == "contact").sum(axis=1),
+    "open": lambda found: (found["status"] == "open").sum(axis=1),
+    "undecided": lambda found: (found["status"] == "undecided").sum(axis=1),
     "approach": lambda found: found["approaches"],
     "approach_error": lambda found: found["approach_errors"],
     "load": lambda found: found["loads"],
@@ -164,7 +154,9 @@ NORMAL: dict[str, Callable[[Found], Array]] = {
     "certificate.load_error": lambda found: found["asperity_load_errors"].max(axis=1),
 }
 CYCLE: dict[str, Callable[[Found], Array]] = {
-    **{name: _count(name) for name in ("sliding", "partial", "undecided")},
+    "sliding": lambda found: (found["status"] == "sliding").sum(axis=1),
+    "partial": lambda found: (found["status"] == "partial").sum(axis=1),
+    "undecided": NORMAL["undecided"],
     "loss": lambda found: found["losses"],
     "loss_error": lambda found: found["loss_errors"],
     "force_amplitude": lambda found: found["amplitudes"],
@@ -229,11 +221,9 @@ def _known(
             fields["smooth"] = np.where(np.isnan(scales), np.nan, mindlin.loss(half))
             label = row_label((low, high))
             values |= {(f"cycle.{name}", label): number(fields) for name, number in CYCLE.items()}
-    return {
-        k: Measured(
-            {name: float(each[k]) for name, each in values.items()},
-            "",
-            "; ".join(cautions_about(scenes[k], contacts["asperity_loads"][k])),
-        )
-        for k in np.flatnonzero(good).tolist()
-    }
+    found = {}
+    for k in np.flatnonzero(good).tolist():
+        numbers = {name: float(each[k]) for name, each in values.items()}
+        warned = "; ".join(cautions_about(scenes[k], contacts["asperity_loads"][k]))
+        found[k] = Measured(numbers, "", warned)
+    return found

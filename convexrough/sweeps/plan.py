@@ -27,11 +27,9 @@ from convexrough.tabular.units import UnitNames
 from convexrough.version import __version__
 
 #: A batch has at most MOST_SCENES scenes and about MOST_ASPERITIES asperities. There are about
-#: LEAST_BATCHES batches or more, if there are enough scenes.
-MOST_SCENES, MOST_ASPERITIES, LEAST_BATCHES = 1000, 100_000, 32
-
-#: At most this many scenes are tried to find out which numbers can be measured.
-TRIED = 5
+#: LEAST_BATCHES batches or more, if there are enough scenes. At most TRIED scenes are tried to find
+#: out which numbers can be measured.
+MOST_SCENES, MOST_ASPERITIES, LEAST_BATCHES, TRIED = 1000, 100_000, 32, 5
 
 
 @dataclass(frozen=True)
@@ -49,28 +47,22 @@ class Plan:
         return Batch(self.source.part(part), self.columns, part)
 
 
-def read_sweep(path: str | os.PathLike[str], measure: Sequence[str] | None = None) -> Plan:
-    """The plan of a sweep file, after a check of the file.
-
-    measure : names of numbers to measure in place of those in the file
-
-    Raises FileError if the file cannot be read or is not TOML, and the errors of `plan_of`.
-    """
-    path = Path(path)
-    text = read_text(path)
-    return plan_of(tables_of(path, text), path, measure, text)
-
-
 def plan_of(
-    contents: Mapping[str, Any], path: Path, measure: Sequence[str] | None = None, text: str = ""
+    what: Mapping[str, Any] | str | os.PathLike[str],
+    path: Path = Path("sweep"),
+    measure: Sequence[str] | None = None,
 ) -> Plan:
-    """The plan of a sweep, from the tables of a sweep file.
+    """The plan of a sweep file, or of the tables of the sweep file at `path`.
 
-    path : the sweep file, for messages; paths in the tables are relative to its folder
+    measure : replaces the list of numbers in the file
 
-    Raises SceneFileError, which lists every mistake; InputError for an unknown measure; and the
-    error of the last scene tried if the first `TRIED` scenes fail.
+    Raises FileError, SceneFileError, InputError; and the last error if `TRIED` scenes all fail.
     """
+    contents, text = what, ""
+    if not isinstance(contents, Mapping):
+        path = Path(contents)
+        text = read_text(path)
+        contents = tables_of(path, text)
     tables = {name: table for name, table in contents.items() if name != "sweep"}
     table = contents.get("sweep")
     if table is None:
@@ -102,8 +94,7 @@ def _nothing_random(contents: Mapping[str, Any]) -> Iterator[str]:
     table = table_in(contents, "sweep")
     given = {*table_in(contents, "asperities")}
     given |= {key.removeprefix("asperities.") for _, key in swept(table)}
-    rough = not given.isdisjoint({"height_std", "tip_radius_cv"})
-    if "seeds" in table and not table.get("draw") and not rough:
+    if "seeds" in table and not table.get("draw") and not given & {"height_std", "tip_radius_cv"}:
         yield (
             "[sweep] seeds: nothing is random: expected height_std or tip_radius_cv in "
             "[asperities], or a table [sweep.draw]"
@@ -150,8 +141,8 @@ def plan_of_scenes(
         layout, material = scene.asperities, scene.material
         for values in (layout.positions, layout.tip_radii, layout.heights):
             content.update(values.tobytes())
-        content.update(repr((scene.sphere_radius, material, scene.friction)).encode())
-        content.update(f"{scene.geometry} {len(scene)}".encode())
+        numbers = (scene.sphere_radius, material, scene.friction)
+        content.update(f"{numbers}{scene.geometry} {len(scene)}".encode())
     given = {"scenes": content.hexdigest(), name: controls, "stages": repr(stages)}
     common: Any = {"approach": None, "load": None, "stages": stages, "solver": Newton()}
     tasks = {
@@ -165,8 +156,8 @@ def plan_of_scenes(
 def _stages(cycle: Sequence[float], shear: Sequence[float]) -> Stages:
     found: dict[str, Stage] = {"normal": NormalStage(approach=0.0)}
     mistakes: list[str] = []
-    models: tuple[tuple[type[Stage], str, Sequence[float]], ...]
-    models = ((ShearStage, "fractions", shear), (CycleStage, "maximum_fraction", cycle))
+    models: list[tuple[type[Stage], str, Sequence[float]]]
+    models = [(ShearStage, "fractions", shear), (CycleStage, "maximum_fraction", cycle)]
     for model, key, values in models:
         checks.sequence(model.name, values, "a list of fractions of f P")
         if len(values):
@@ -181,19 +172,12 @@ def _stages(cycle: Sequence[float], shear: Sequence[float]) -> Stages:
 
 
 def _planned(
-    source: Source,
-    measures: Sequence[str],
-    said: Mapping[str, Any],
-    units: UnitNames,
-    **given: Any,
+    source: Source, measures: Sequence[str], said: Mapping[str, Any], units: UnitNames, **given: Any
 ) -> Plan:
     """The plan for the scenes of `source`. The first scene that succeeds shows which numbers exist.
 
     said  : entries of the manifest that describe the origin of the sweep
     given : all input on which the measured numbers depend, except `measures` and the version
-
-    Raises InputError for an unknown measure. If the first `TRIED` scenes all fail, raises the error
-    of the last of them.
     """
     ask = source.part(range(tried := min(source.count, TRIED))).opened()
     with blamed_on(said["source"], unless_known=True):
@@ -208,34 +192,28 @@ def _planned(
                     raise
     few = -(-source.count // LEAST_BATCHES)
     contents = {"version": __version__, "measure": list(measures), **given}
-    text = json.dumps(contents, sort_keys=True, default=repr)
+    inputs = hashlib.sha256(json.dumps(contents, sort_keys=True, default=repr).encode())
     grid = source.grid if isinstance(source, Tables) else None
     labels = list(source.labels(range(0)))
     numbers = {key: key for key in labels} | {it.name: it.number for it in columns}
     used = {"normal", *(column.stage for column in columns)}
+    own_loads = []  # tables with loads of their own that do not vary, although [normal] does
+    if grid and {"normal.load", "normal.approach"} & {*labels}:
+        own = [name for name, stage in asked.stages.items() if name in used and stage.highest_load]
+        own_loads = [it for it in own if not any(key.startswith(f"{it}.") for key in labels)]
     manifest = {
         "schema": 2,
         "version": __version__,
-        "sweep": hashlib.sha256(
-            text.encode()
-        ).hexdigest(),  # hash of all input on which the numbers depend
+        "sweep": inputs.hexdigest(),
         "scenes": source.count,
         "each": grid.each if grid else 1,  # number of scenes that differ only in the seed
         "batch": max(1, min(MOST_SCENES, MOST_ASPERITIES // len(contact.scene), few)),
         "columns": ["scene", *labels, "status", "message", *(it.name for it in columns)],
         "drawn": [*grid.draw] if grid else [],
         "not_measured": [name for name in asked.stages if name not in used],
-        "own_loads": _own_loads(asked.stages, used, labels) if grid else [],
+        "own_loads": own_loads,
         "units": {name: it for name, end in numbers.items() if (it := unit(end, units))},
         **said,
         "versions": VERSIONS,
     }
     return Plan(source, columns, manifest)
-
-
-def _own_loads(stages: Stages, used: set[str], swept: list[str]) -> list[str]:
-    """The measured tables with loads of their own that are not swept, although [normal] is."""
-    if not {"normal.load", "normal.approach"} & {*swept}:
-        return []
-    own = [name for name, stage in stages.items() if name in used and stage.highest_load]
-    return [name for name in own if not any(key.startswith(f"{name}.") for key in swept)]

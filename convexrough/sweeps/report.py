@@ -18,30 +18,23 @@ from convexrough.sweeps.plan import Plan
 from convexrough.sweeps.table import SweepTable, open_sweep
 from convexrough.tabular.columns import aligned, labelled
 
-#: The quantiles that are printed, and the largest numbers of printed rows, printed failures and
-#: drawn figures.
+#: The printed quantiles; the largest numbers of printed rows, printed failures and drawn figures.
 AT, MOST_ROWS, MOST_NAMED, MOST_FIGURES = (0.05, 0.5, 0.95), 40, 5, 24
 
 
 def summarise(table: SweepTable, **did: Any) -> Summary:
     """What `--json` prints: the state of the table, and `did`, the second result of `run`."""
-    said = {
-        "folder": str(table.folder.path) if table.folder else None,
-        "hash": table.manifest["sweep"],
-        "scenes": table.scenes,
-        "rows": len(table),
-        **table.counts(),
-        "not_measured": table.manifest["not_measured"],
-        **did,
-    }
-    return headed(sweep=said)
+    folder = str(table.folder.path) if table.folder else None
+    said = {"folder": folder, "hash": table.manifest["sweep"], "scenes": table.scenes}
+    said |= {"rows": len(table), **table.counts(), "not_measured": table.manifest["not_measured"]}
+    return headed(sweep=said | did)
 
 
 def describe(summary: Summary) -> list[str]:
     """The printed report of a sweep, from its summary."""
     it = summary["sweep"]
-    lines = [("scenes", f"{it['scenes']:,}"), ("rows", f"{it['rows']:,}")]
-    lines += [(f"  {status}", f"{it[status]:,}") for status in ("certified", "undecided", "failed")]
+    names = ("scenes", "rows", "  certified", "  undecided", "  failed")
+    lines = [(name, f"{it[name.strip()]:,}") for name in names]
     if "computed" in it:
         rate = it["computed"] / it["seconds"]
         said = f"{it['computed']:,} scenes in {it['seconds']:,.0f} s, {rate:,.3g} per second"
@@ -87,17 +80,14 @@ def _messages(table: SweepTable, status: str) -> Iterator[str]:
             yield f"scene {block['scene'][row]}: {block['message'][row]}"
 
 
-def write_summary(new: Writer, table: SweepTable, found: Columns) -> None:
-    """Write quantiles.csv, and figures of measured numbers against swept keys."""
-    pairs = [(name, key) for key in table.swept for name in table.measured][:MOST_FIGURES]
+def write_summary(new: Writer, table: SweepTable, found: Columns) -> list[str]:
+    """Write quantiles.csv and figures; a line tells how many figures are left out, if any are."""
+    pairs = [(name, key) for key in table.swept for name in table.measured]
     new.tables({"quantiles": found})
-    figures: Any = {f"{name}-over-{key}": table.plot(name, key).figure for name, key in pairs}
+    figures: Any = {f"{name}-over-{key}": table.plot(name, key).figure
+                    for name, key in pairs[:MOST_FIGURES]}  # fmt: skip
     new.figures(figures)
-
-
-def figures_left_out(table: SweepTable) -> list[str]:
-    """A line with the number of figures that `write_summary` leaves out; [] if it draws all."""
-    more = len(table.swept) * len(table.measured) - MOST_FIGURES
+    more = len(pairs) - MOST_FIGURES
     advice = "cr.open_sweep(DIR).plot(quantity, key) draws each in Python"
     return [f"not drawn: {more} more figures; {advice}"] if more > 0 else []
 

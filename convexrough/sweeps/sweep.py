@@ -1,33 +1,45 @@
-"""`sweep`: compute many scenes, and return a table."""
+"""`sweep`: compute many scenes, and return a table; and the workers that compute the batches."""
 
 from __future__ import annotations
 
+import multiprocessing
 import os
+import signal
+import sys
+import threading
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from concurrent import futures
+from concurrent.futures import BrokenExecutor, Executor, Future
+from contextlib import contextmanager, nullcontext, suppress
 from datetime import timedelta
+from itertools import islice
 from pathlib import Path
+from types import ModuleType
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from convexrough import checks
-from convexrough.errors import InputError
+from convexrough.errors import InputError, WorkerError, needed
 from convexrough.progress import LOGGER
 from convexrough.scene.scene import Scene
-from convexrough.sweeps.batch import Batch, Columns
+from convexrough.sweeps.batch import Batch, Columns, compute, different
 from convexrough.sweeps.folder import make_folder, part_from
-from convexrough.sweeps.plan import Plan, plan_of, plan_of_scenes, read_sweep
-from convexrough.sweeps.pool import Processes, computed
+from convexrough.sweeps.plan import Plan, plan_of, plan_of_scenes
 from convexrough.sweeps.table import SweepTable
+from convexrough.threads import cores
 
 #: The first argument of `sweep`: a sweep file, the tables of a sweep file, or scenes.
 What: TypeAlias = str | os.PathLike[str] | Mapping[str, Any] | Iterable[Scene]
 
 #: Largest number of scenes that one call computes; for more, each call computes a share.
 MOST = 10**8
+
+#: Largest numbers of batches submitted at a time to a given executor, and for each local process;
+#: and of batches that may be lost because their workers die.
+AT_ONCE, EACH, MOST_LOST = 1000, 2, 64
 
 
 def sweep(
@@ -82,24 +94,18 @@ def sweep(
         expected = "the folder of an earlier sweep, as resume and overwrite need one"
         raise InputError("out", found="none", expected=expected)
     given = {"approach": approach, "load": load, "cycle": cycle or None, "shear": shear or None}
-    if isinstance(what, (str, os.PathLike, Mapping)):
-        for name, value in given.items():
-            if value is not None:
-                raise InputError(name, found="given", expected="none: the sweep tables state it")
-        if isinstance(what, Mapping):
-            plan = plan_of(what, Path("sweep"), measure)
-        else:
-            plan = read_sweep(what, measure)
-    else:
+    if not isinstance(what, (str, os.PathLike, Mapping)):
         plan = plan_of_scenes(what, measure, approach, load, cycle, shear)
-    asked: Any = dict(out=out, resume=resume, overwrite=overwrite, part=part)
+    elif name := next((name for name, value in given.items() if value is not None), ""):
+        raise InputError(name, found="given", expected="none: the sweep tables state it")
+    else:
+        plan = plan_of(what, measure=measure)
     if executor is not None:
         checks.instance("executor", executor, Executor)
-        return run(plan, executor, **asked)[0]
-    if workers is not None:
+    elif workers is not None:
         checks.whole("workers", workers)
-    with Processes(workers) as mine:
-        return run(plan, mine, **asked)[0]
+    with nullcontext(executor) if executor is not None else Processes(workers) as mine:
+        return run(plan, mine, out=out, resume=resume, overwrite=overwrite, part=part)[0]
 
 
 def run(
@@ -113,8 +119,8 @@ def run(
 ) -> tuple[SweepTable, dict[str, Any]]:
     """Compute the missing rows of the table of a plan; arguments as for `sweep`.
 
-    Returns the table, and a dictionary: `found` is a message about rows that existed already,
-    `computed` the number of scenes that this call computed, and `seconds` its time.
+    Returns the table, and by name: a message about rows that are `found`, the number of scenes
+    that are `computed`, and `seconds`.
     """
     began, folder, found = time.monotonic(), None, ""
     todo = _share(plan, part)
@@ -132,18 +138,16 @@ def run(
     did = {"found": found, "computed": count, "seconds": time.monotonic() - began}
     if folder is not None:
         return SweepTable(folder.manifest, folder), did
-    joined = {name: np.concatenate([each[name] for each in parts]) for name in parts[0]}
-    order = np.argsort(joined["scene"])
-    rows = {name: values[order] for name, values in joined.items()}
+    parts.sort(key=lambda each: each["scene"][0] if len(each["scene"]) else -1)
+    rows = {name: np.concatenate([each[name] for each in parts]) for name in parts[0]}
     return SweepTable(plan.manifest, None, rows), did
 
 
 def _share(plan: Plan, part: tuple[int, int] | None) -> list[range]:
     """The parts (ranges of scenes) in share k of n shares, for `part` = (k, n); all for None."""
-    given: Any = (1, 1) if part is None else part
-    if not isinstance(given, tuple) or len(given) != 2:
+    if part is not None and not (isinstance(part, tuple) and len(part) == 2):
         raise InputError("part", found=repr(part), expected="(K, N) with K from 1 to N")
-    k, n = given
+    k, n = part or (1, 1)
     if not 1 <= k <= n:
         raise InputError("part", found=f"{k}/{n}", expected="K/N with K from 1 to N")
     size = plan.manifest["batch"]
@@ -167,3 +171,133 @@ def _report_progress(found: Iterator[Columns], count: int) -> Iterator[Columns]:
         left = timedelta(seconds=round((count - done) / rate))
         said = f"{done:,} of {count:,} scenes, {rate:,.3g} per second, {left} left"
         LOGGER.info(said + (f", {failed:,} failed" if failed else ""))
+
+
+def computed(batches: Iterable[Batch], executor: Executor) -> Iterator[Columns]:
+    """Yield the rows of batches, in order of completion; lost ones again at the end, one by one.
+
+    Raises WorkerError if a batch is lost twice, if more than `MOST_LOST` batches are lost, if a
+    worker has other versions of packages, or if the executor is broken or cancels a batch.
+    """
+    lost = yield from _together(iter(batches), executor)
+    dead = []
+    for batch in lost:
+        dead += yield from _together(iter((batch,)), executor)
+    if dead:
+        which = ", ".join(map(str, dead))
+        raise WorkerError(f"the process that computed scenes {which} died twice")
+
+
+def _together(
+    batches: Iterator[Batch], executor: Executor
+) -> Generator[Columns, None, list[Batch]]:
+    """Yield the rows of batches in any order; return the batches whose workers died."""
+    most = EACH * executor.workers if isinstance(executor, Processes) else AT_ONCE
+    pending: dict[Future[Any], Batch] = {}
+    lost: list[Batch] = []
+    dask = sys.modules.get("distributed")
+    killed = (dask.KilledWorker,) if dask else ()
+    try:
+        while True:
+            for batch in islice(batches, most - len(pending)):
+                pending[executor.submit(compute, batch)] = batch
+            if not pending:
+                return lost
+            for future in futures.wait(pending, return_when=futures.FIRST_COMPLETED).done:
+                batch = pending.pop(future)
+                try:
+                    columns, versions = future.result()
+                except (BrokenExecutor, *killed) as error:
+                    lost.append(batch)
+                    if len(lost) > MOST_LOST:
+                        said = f"workers died in more than {MOST_LOST} batches: {error}"
+                        raise WorkerError(said) from error
+                    continue
+                if other := different(versions):
+                    raise WorkerError(f"a worker has other versions: {other}")
+                yield columns
+    except BrokenExecutor as error:  # only the caller can restart this executor
+        raise WorkerError(f"the executor is broken: {error}") from error
+    except futures.CancelledError as error:
+        raise WorkerError("a batch was cancelled: check that the scheduler runs") from error
+    finally:
+        for future in pending:
+            future.cancel()
+
+
+class Processes(Executor):
+    """An executor with processes on this machine. If one dies, new processes replace all."""
+
+    def __init__(self, workers: int | None = None) -> None:
+        self.workers = workers or cores()
+        self._context = multiprocessing.get_context("spawn")
+        self._held, self._leash = self._context.Pipe(duplex=False)
+        self._pool = self._begun()
+
+    def _begun(self) -> futures.ProcessPoolExecutor:
+        return futures.ProcessPoolExecutor(
+            self.workers, self._context, initializer=_end_with, initargs=(self._held,)
+        )
+
+    def submit(self, function: Callable[..., Any], /, *given: Any, **named: Any) -> Future[Any]:
+        with _sheltered():
+            try:
+                return self._pool.submit(function, *given, **named)
+            except BrokenExecutor:
+                self._pool = self._begun()
+                return self._pool.submit(function, *given, **named)
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = True) -> None:
+        """End the processes at once, without waiting for their batches."""
+        self._leash.close()
+        self._pool.shutdown(wait, cancel_futures=cancel_futures)
+
+
+def _end_with(pipe: Any) -> None:
+    """Start a thread that ends this process when the parent's end of the pipe closes."""
+
+    def watch() -> None:
+        with suppress(EOFError, OSError):
+            pipe.recv_bytes()
+        os._exit(1)
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=watch, daemon=True).start()
+
+
+@contextmanager
+def _sheltered() -> Iterator[None]:
+    """A context in which new processes do not run the user's script, and ignore interrupts."""
+    script = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    masks = hasattr(signal, "pthread_sigmask")  # false on Windows
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if masks else set()
+    try:
+        yield
+    finally:
+        if masks:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        sys.modules["__main__"] = script
+
+
+@contextmanager
+def dask(address: str) -> Iterator[Executor]:
+    """An executor on the workers of a Dask scheduler; workers may join and leave.
+
+    address : "tcp://host:port", the path of a .json file, or "local" for a new cluster here
+
+    Raises ExtraError if Dask is not installed; InputError if no scheduler answers.
+    """
+    client_of = needed("distributed", "dask").Client
+    given: Any = {"address": address}
+    if address == "local":
+        given = {"n_workers": cores(), "threads_per_worker": 1, "dashboard_address": None}
+    elif address.endswith(".json"):
+        given = {"scheduler_file": address}
+    try:
+        client = client_of(**given, set_as_default=False)  # else a failing one stays the default
+    except (OSError, ValueError, TimeoutError) as error:
+        expected = 'a scheduler of Dask that answers, its file, or "local"'
+        raise InputError("scheduler", found=f"{address} ({error})", expected=expected) from error
+    with client:
+        yield client.get_executor(pure=False)

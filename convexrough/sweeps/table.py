@@ -105,7 +105,7 @@ class SweepTable(Record):
         """The number of rows."""
         if self.in_memory is not None:
             return len(self.in_memory["scene"])
-        return sum(map(len, self._parts()))
+        return sum(map(len, self.folder.parts())) if self.folder is not None else 0
 
     def blocks(self, names: Sequence[str] | None = None) -> Iterator[Columns]:
         """Yield some columns, by default all, one part at a time; for large tables.
@@ -117,7 +117,7 @@ class SweepTable(Record):
             yield {name: self.in_memory[name] for name in names}
             return
         assert self.folder is not None  # else the table is in memory
-        for part in self._parts():
+        for part in self.folder.parts():
             yield self.folder.read(part, names)
 
     def read(self, names: Sequence[str] | None = None) -> Columns:
@@ -164,9 +164,9 @@ class SweepTable(Record):
         names = self._chosen(columns, self.columns)
         if self.folder is None or not len(self):
             raise InputError("table", found="no parts", expected="rows in a folder")
-        frame = partial(_frame, self.folder, names)
-        meta = frame(self._parts()[0]).iloc[:0]
-        found: dask.dataframe.DataFrame = frames_of_dask.from_map(frame, self._parts(), meta=meta)
+        frame, parts = partial(_frame, self.folder, names), self.folder.parts()
+        found: dask.dataframe.DataFrame
+        found = frames_of_dask.from_map(frame, parts, meta=frame(parts[0]).iloc[:0])
         return found
 
     def plot(
@@ -235,10 +235,6 @@ class SweepTable(Record):
         label = (f"{table}: {key}" if table else key).replace("_", " ")
         unit = self.manifest["units"].get(name, "")
         return f"{label} ({unit})" if unit else label
-
-    def _parts(self) -> list[range]:
-        assert self.folder is not None  # else the table is in memory
-        return self.folder.parts()
 
     def _chosen(self, names: Sequence[str] | None, known: list[str]) -> list[str]:
         """The given names, by default all known ones. Raises InputError for unknown names."""

@@ -13,8 +13,8 @@ from scenes import MATERIAL, PAPER_APPROACH, paper, rough
 
 import convexrough as cr
 from convexrough import plots
+from convexrough.paper.example import PaperStates
 from convexrough.paper.figures import paper_figures
-from convexrough.paper.states import PaperStates
 from convexrough.plots.asperity_map import SLIDING
 from convexrough.sphere.smooth import smooth
 

@@ -13,7 +13,7 @@ from playwright.sync_api import Browser, Page, sync_playwright
 
 import convexrough as cr
 from convexrough.paper import example
-from convexrough.run.results import slider_page
+from convexrough.plots.slider import slider_html
 from convexrough.run.stages.normal import NormalStage
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
@@ -30,7 +30,8 @@ def contact() -> cr.Contact:
 
 @pytest.fixture(scope="module")
 def page(contact: cr.Contact) -> str:
-    return slider_page(NormalStage(approach=contact.approach).compute(contact))
+    pressed = NormalStage(approach=contact.approach).compute(contact)
+    return slider_html(contact, pressed.lines())
 
 
 def test_the_file_needs_nothing_else_and_is_small(page: str) -> None:

@@ -19,8 +19,7 @@ from convexrough.progress import logged
 from convexrough.sweeps import plan
 from convexrough.sweeps.batch import Tables
 from convexrough.sweeps.plan import Plan, plan_of
-from convexrough.sweeps.pool import Processes, dask
-from convexrough.sweeps.sweep import run
+from convexrough.sweeps.sweep import Processes, dask, run
 
 #: Whatever ran before in this process, and whichever threads it left, nothing is forked.
 SPAWN = multiprocessing.get_context("spawn")

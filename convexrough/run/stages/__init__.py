@@ -1,4 +1,4 @@
-"""The stages of a run. Each has a module of its own and an entry in `STAGES`."""
+"""The stages of a run. Each has an entry in `STAGES`."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from convexrough.run.stages.constant_load import HistoryStage
 from convexrough.run.stages.constant_load import ShearStage as ShearStage
 from convexrough.run.stages.gradient import GradientStage
 from convexrough.run.stages.normal import NormalStage as NormalStage
-from convexrough.run.stages.path import PathStage, SteadyStage
-from convexrough.run.stages.shakedown import ShakedownStage
+from convexrough.run.stages.path import PathStage, ShakedownStage, SteadyStage
 
 #: Stages by the names of their tables in a scene file, in the order of results.
 STAGES: dict[str, type[Stage]] = {

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from convexrough import plots
 from convexrough.contact import Contact
@@ -18,7 +17,7 @@ from convexrough.friction.fretting import Fretting, fretting, fretting_columns
 from convexrough.friction.path import history
 from convexrough.friction.shear import shear
 from convexrough.friction.steady import cycles
-from convexrough.run.stage import Columns, Labels, Result, Stage, Steps, Summary, limit, same
+from convexrough.run.stage import Columns, Labels, Result, Stage, Steps, Summary, heads, limit
 from convexrough.run.values import Fractions, Mistake, Shares, Whole, expected
 from convexrough.scene.rings import one_of_each_ring
 
@@ -51,27 +50,21 @@ class ShearStage(Stage):
 
     def compute(self, contact: Contact) -> ShearResult:
         f_p = limit(contact)
-        states = (shear(contact, force=part * f_p) for part in self.fractions)
-        return ShearResult(self, contact, tuple(states))
+        states = tuple(shear(contact, force=part * f_p) for part in self.fractions)
+        return ShearResult(self, contact, states)
 
 
 class ShearResult(Result):
-    """The result of [shear]: a friction state for each fraction."""
-
     stage: ShearStage
-    printed: ClassVar[Mapping[str, str]] = {
-        "fraction": "Q/(fP)",
-        **same("force", "displacement", "sliding", "partial", "undecided"),
-    }
+    printed = heads("fraction: Q/(fP), force, displacement, sliding, partial, undecided")
 
     def proved_forces(self) -> Iterator[float]:
         return (abs(state.force) for state in self.found)
 
     def tables(self) -> dict[str, Columns]:
         """The tables, with a row for each fraction and asperity."""
-        x, y = self.contact.scene.asperities.positions.T
         names = ("forces", "stick_radii", "slips", "displacements", "status")
-        each = [{"x": x, "y": y, **state.columns(*names)} for state in self.found]
+        each = [self.at_asperities(state.columns(*names)) for state in self.found]
         return {"shear": self.stacked(each)}
 
     def figures(self) -> Mapping[str, Any]:
@@ -81,7 +74,7 @@ class ShearResult(Result):
 class CycleStage(Stage):
     """The largest and smallest shear forces of steady cycles, as fractions of f P.
 
-    minimum_fraction : the smallest force of each cycle; default: minus the largest force
+    minimum_fraction : default: minus the largest force
     loop_points : approximate number of points of a loop; the default is smaller for many
         asperities, and where order fails
     loop_asperities : indices of asperities whose loops are computed, or "all"; default: one
@@ -102,9 +95,8 @@ class CycleStage(Stage):
     @property
     def lowest(self) -> list[float]:
         """The minimum of each cycle, as a fraction of the friction limit."""
-        if self.minimum_fraction is not None:
-            return self.minimum_fraction
-        return [-value for value in self.maximum_fraction]
+        given = self.minimum_fraction
+        return [-value for value in self.maximum_fraction] if given is None else given
 
     @property
     def labels(self) -> Labels:
@@ -135,37 +127,26 @@ class CycleStage(Stage):
 
 
 class CycleResult(Result):
-    """The result of [cycle]: the steady cycles."""
-
     stage: CycleStage
     title = (
         "steady cycles: amplitudes Qa of the force and Xa of the displacement, energy loss W; "
         "W0: six times a smooth sphere's W at the onset of gross sliding"
     )
     digits = 6
-    printed: ClassVar[Mapping[str, str]] = {
-        "maximum_fraction": "max/(fP)",
-        "minimum_fraction": "min/(fP)",
-        "force_amplitude": "Qa",
-        "displacement_amplitude": "Xa",
-        "secant_stiffness": "Qa/Xa",
-        "loss": "W",
-        "loss_factor": "W/(pi Qa Xa)",
-        "loss_normalised": "W/W0",
-        "smooth_normalised": "smooth W/W0",
-        "sliding": "sliding",
-    }
+    printed = heads(
+        "maximum_fraction: max/(fP), minimum_fraction: min/(fP), force_amplitude: Qa, "
+        "displacement_amplitude: Xa, secant_stiffness: Qa/Xa, loss: W, loss_factor: W/(pi Qa Xa), "
+        "loss_normalised: W/W0, smooth_normalised: smooth W/W0, sliding"
+    )
 
     def rows(self) -> list[Summary]:
-        return [
-            {
-                **row,
-                "loss_over_smooth": cycle.loss_normalised / (cycle.smooth_normalised or math.nan),
-                "partial_slip_loss": float(cycle.partial_slip_losses.sum()),
-                "sliding_loss": float(cycle.sliding_losses.sum()),
-            }
-            for row, cycle in zip(super().rows(), self.found, strict=True)
-        ]
+        rows = super().rows()
+        for row, cycle in zip(rows, self.found, strict=True):
+            smooth = cycle.smooth_normalised or math.nan
+            row["loss_over_smooth"] = cycle.loss_normalised / smooth
+            row["partial_slip_loss"] = float(cycle.partial_slip_losses.sum())
+            row["sliding_loss"] = float(cycle.sliding_losses.sum())
+        return rows
 
     def proved_forces(self) -> Iterator[float]:
         return ((cycle.maximum - cycle.minimum) / 2 for cycle in self.found)
@@ -178,13 +159,12 @@ class CycleResult(Result):
         affordable = int(np.clip(AFFORDABLE // touching, LEAST_POINTS, MOST_POINTS))
         if any(each.order == "fails" for each in self.found):  # a general step for each point
             affordable = LEAST_POINTS
-        chosen: ArrayLike | None = None  # None means all
-        if stage.loop_asperities is None:
+        chosen = stage.loop_asperities
+        if chosen is None:
             distances = contact.scene.asperities.distances
             chosen = one_of_each_ring(distances, contact.loads, MOST_LOOPS)
-        elif stage.loop_asperities != "all":
-            chosen = stage.loop_asperities
-        return loops(self.found, stage.loop_points or affordable, chosen)
+        points = stage.loop_points or affordable
+        return loops(self.found, points, None if chosen == "all" else chosen)
 
     @cached_property
     def worn(self) -> list[Fretting]:
@@ -195,37 +175,32 @@ class CycleResult(Result):
         """The tables of cycles, of loops (in total and by asperity) and of fretting by asperity."""
         worn = self.stacked([fretting_columns([each]) for each in self.worn])
         del worn["maximum"], worn["minimum"]  # fractions replace forces, as in the other tables
-        curves = self.stacked([_curves(loop) for loop in self.loops])
+        curves = self.stacked([
+            {
+                "curve": np.repeat(["total", *it.asperities.astype(str)], len(it.forces)),
+                "force": np.concatenate([it.forces, *it.asperity_forces.T]),
+                "displacement": np.concatenate([it.displacements, *it.asperity_displacements.T]),
+            }
+            for it in self.loops
+        ])  # fmt: skip
         return {**super().tables(), "loop": curves, "fretting": worn}
 
-    @property
-    def smooth(self) -> bool:
-        """True if the energy scale W0 of a smooth sphere is known."""
-        return not math.isnan(self.known[0]["smooth_normalised"])
-
     def headings(self) -> Mapping[str, str]:
-        over = {key: it for key, it in self.printed.items() if not key.endswith("_normalised")}
-        return self.printed if self.smooth else over
+        """The headings, without those of W/W0 if the energy scale of a smooth sphere is unknown."""
+        known = not math.isnan(self.known[0]["smooth_normalised"])
+        return {key: it for key, it in self.printed.items() if known or "_normalised" not in key}
 
     def lines(self) -> list[str]:
+        if "loss_normalised" in self.headings():
+            return super().lines()
         bodies = "a flat or a cylinder has no smooth reference"
-        said = f"no W/W0: {bodies if self.contact.load else 'no asperity carries a load'}"
-        return [*super().lines(), *([] if self.smooth else [said])]
+        why = bodies if self.contact.load else "no asperity carries a load"
+        return [*super().lines(), f"no W/W0: {why}"]
 
     def figures(self) -> Mapping[str, Any]:
         widest = max(self.worn, key=lambda each: each.maximum - each.minimum)
         figures = plots.cycle_figures(self.found, loops=self.loops)
         return {**figures, **plots.fretting_figures(widest)}
-
-
-def _curves(loop: Loop) -> Columns:
-    """Columns: the points of the loop of the whole contact, then those of each asperity."""
-    names = ["total", *loop.asperities.astype(str)]
-    return {
-        "curve": np.repeat(names, len(loop.forces)),
-        "force": np.concatenate([loop.forces, *loop.asperity_forces.T]),
-        "displacement": np.concatenate([loop.displacements, *loop.asperity_displacements.T]),
-    }
 
 
 class HistoryStage(Stage):
@@ -246,7 +221,5 @@ class HistoryStage(Stage):
 
 
 class HistoryResult(Steps):
-    """The result of [history]: the state after each force."""
-
     stage: HistoryStage
-    printed: ClassVar[Mapping[str, str]] = {"fraction": "Q/(fP)", **same("displacement", "loss")}
+    printed = heads("fraction: Q/(fP), displacement, loss")

@@ -15,7 +15,7 @@ from convexrough.errors import InputError, SolverError
 from convexrough.gradients.gradient import Holding
 from convexrough.gradients.objective import NUMBERS, gradient_of
 from convexrough.run.stage import Columns, Result, Stage, Summary, limit
-from convexrough.run.values import Mistake, Share, expected
+from convexrough.run.values import Mistake, Share, expected, one_of
 from convexrough.tabular.columns import bound, labelled
 
 #: Results whose gradient a scene file may request, and their symbols.
@@ -41,7 +41,7 @@ class GradientStage(Stage):
 
     name = "gradient"
 
-    of: Annotated[str, expected(f"one of: {', '.join(LETTERS)}", LETTERS.__contains__)]
+    of: Annotated[str, one_of(LETTERS)]
     fraction: Share | None = None
     by: Annotated[
         list[str],
@@ -71,16 +71,12 @@ class GradientStage(Stage):
             force = (self.fraction or 0.0) * limit(contact) if self.sheared else None
             gradient = gradient_of(contact, self.of, force, self.holding)
             return GradientResult(self, contact, (gradient,))
-        except InputError as error:
-            return GradientResult(self, contact, (), str(self._in_the_file(error)))
-        except SolverError as error:
-            return GradientResult(self, contact, (), str(error))
-
-    def _in_the_file(self, error: InputError) -> InputError:
-        if error.what not in ("force", "maximum"):
-            return error
-        found = f"{self.fraction:g}, a force of {error.found}"
-        return InputError("[gradient] fraction", found=found, expected=error.expected)
+        except (InputError, SolverError) as error:
+            why = error
+            if isinstance(error, InputError) and error.what in ("force", "maximum"):
+                found = f"{self.fraction:g}, a force of {error.found}"
+                why = InputError("[gradient] fraction", found=found, expected=error.expected)
+            return GradientResult(self, contact, (), str(why))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -121,8 +117,7 @@ class GradientResult(Result):
         if not self.found:
             return {}
         (gradient,), by = self.found, self.stage.by
-        x, y = self.contact.scene.asperities.positions.T
-        columns = {"x": x, "y": y}
+        columns = self.at_asperities({})
         for name in ("heights", "tip_radii"):
             if name in by:
                 columns[f"by_{EACH[name]}"] = getattr(gradient, name)
@@ -149,14 +144,12 @@ class GradientResult(Result):
         rows = [("  value", f"{said['value'] + 0.0:.10g}")]  # 0 in place of -0
         rows += [(f"  by {name}", f"{slope + 0.0:.8g}") for name, slope in said["by"].items()]
         for name, most in said["largest"].items():
-            error = bound(said["height_error"])
-            known = f", error at most {error}" if name == "heights" else ""
-            slopes = np.ravel(most["slope"]) + 0.0
-            text = ", ".join(f"{slope:.8g}" for slope in slopes)
-            text = f"({text})" if len(slopes) > 1 else text
-            rows.append(
-                (f"  by {EACH[name]}", f"up to {text}  (asperity {most['asperity']}{known})")
-            )
+            text = ", ".join(f"{slope:.8g}" for slope in np.ravel(most["slope"]) + 0.0)
+            text = f"({text})" if name == "positions" else text
+            where = f"asperity {most['asperity']}"
+            if name == "heights":
+                where += f", error at most {bound(said['height_error'])}"
+            rows.append((f"  by {EACH[name]}", f"up to {text}  ({where})"))
         return [f"gradient of the {said['of']}{under}, {held}", *labelled(rows, 22)]
 
     def figures(self) -> Mapping[str, Any]:

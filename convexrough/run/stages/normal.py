@@ -14,16 +14,13 @@ from convexrough.arrays import Array
 from convexrough.contact import Contact, closest_changes
 from convexrough.errors import SolverError
 from convexrough.normal.certificate import Certificate
-from convexrough.run.stage import Columns, Result, Stage, Summary, unit_of
+from convexrough.run.stage import Columns, Result, Stage, Summary, numbers, unit_of
 from convexrough.run.values import Finite, Positive
 from convexrough.tabular.columns import bound, labelled
 from convexrough.tabular.units import UnitNames
 
-#: `closest_change` considers only loads of at least this fraction of the largest load.
-HEAVY = 0.1
-
-#: The report mentions `closest_change` if it is larger than this.
-DIFFERENT = 0.01
+#: `closest_change` is that of loads of at least HEAVY times the largest, reported above DIFFERENT.
+HEAVY, DIFFERENT = 0.1, 0.01
 
 PROOF = ("scope", "convexity_number", "load_error", "gap_error", "duality_gap")
 COUNTS = ("contact", "open", "undecided")
@@ -58,56 +55,48 @@ class NormalStage(Stage):
 
 
 class NormalResult(Result):
-    """The result of [normal]: the pressed contact."""
-
     def rows(self) -> list[Summary]:
         contact = self.contact
-        found = {name: getattr(contact, name) for name in FOUND}
         judged = judged_loads(contact.certificate, contact.loads)
-        return [judged | found | limits_of(contact)]
+        return [judged | numbers(contact, FOUND) | limits_of(contact)]
 
     def tables(self) -> dict[str, Columns]:
         contact, asperities = self.contact, self.contact.scene.asperities
-        x, y = asperities.positions.T
-        columns: Columns = {"x": x, "y": y}
-        columns |= {"height": asperities.heights, "tip_radius": asperities.tip_radii}
+        columns: Columns = {"height": asperities.heights, "tip_radius": asperities.tip_radii}
         columns |= contact.columns("loads", "contact_radii", "gaps", "status")
-        return {"asperities": columns | contact.certificate.columns("load_errors")}
+        columns |= contact.certificate.columns("load_errors")
+        return {"asperities": self.at_asperities(columns)}
 
     def doubts(self) -> Iterator[str]:
         return plausibility.doubts_of(self.contact)
 
     def cautions(self) -> Iterator[str]:
         yield from plausibility.wrong_loads(self.contact)
-        yield from plausibility.cautions(self.known[0], self.units)
+        yield from plausibility.cautions(self.known[0], self.contact.scene.units)
 
     def figures(self) -> Mapping[str, Any]:
         return plots.press_figures(self.contact)
 
     def lines(self) -> list[str]:
-        return describe(self.known[0], self.units)
+        return describe(self.known[0], self.contact.scene.units)
 
 
 def judged_loads(certificate: Certificate, loads: Array) -> Summary:
     """The summary of the certificate of loads (n,) [force]."""
     return {
         "asperities": len(loads),
-        **{status: int((certificate.status == status).sum()) for status in COUNTS},
-        "approach": certificate.approach,
-        "approach_error": certificate.approach_error,
+        **numbers(certificate, (*COUNTS, "approach", "approach_error")),
         "load": float(loads.sum()),
         "largest_load": float(loads.max()),
-        "certificate": {name: getattr(certificate, name) for name in PROOF},
+        "certificate": numbers(certificate, PROOF),
     }
 
 
 def limits_of(contact: Contact) -> Summary:
     """Measures of the validity of the model: those of `plausibility.limits_of` and two others.
 
-    geometry        : where asperities meet the sphere: "summit" or "closest"
-    closest_change  : largest relative change of loads of at least a tenth of the largest load if
-        the geometry becomes "closest"; None if it is "closest" already, if nothing touches, or if
-        the change is not known
+    closest_change : largest relative change of loads of at least `HEAVY` of the largest load if the
+        geometry becomes "closest"; None if it is so already, if nothing touches, or if not known
     """
     scene, change = contact.scene, None
     if scene.geometry == "summit" and contact.loads.any():
@@ -126,8 +115,10 @@ def describe(normal: Summary, units: UnitNames) -> list[str]:
     """
     proof = normal["certificate"]
     able = f"  ({normal['candidates']} could touch)" if "candidates" in normal else ""
-    width = len(str(normal["asperities"]))
-    relative = _ratio(proof["load_error"], normal["largest_load"])
+    width, largest = len(str(normal["asperities"])), normal["largest_load"]
+    relative = ""
+    if largest and math.isfinite(proof["load_error"]):
+        relative = f"  ({bound(proof['load_error'] / largest)} of the largest load)"
     crowding = normal.get("crowding", 0.0)
     model = f" (but the model does not apply: crowding {crowding:.3g})" if crowding > 1 else ""
 
@@ -150,47 +141,28 @@ def describe(normal: Summary, units: UnitNames) -> list[str]:
     ]
     if "solver" in normal:
         steps = f"{normal['iterations']} iterations, {normal['seconds']:.2g} s"
-        beta, model_error = _neglected(normal), normal["model_error"]
+        unit, error = units.unit("pressure"), normal["model_error"]
+        pressure = f"at most {normal['mean_pressure']:.4g} {unit.name if unit else ''}".rstrip()
+        if not normal["hardness"]:
+            pressure += "  (no hardness given: yield is not checked)"
+        geometry, change = normal["geometry"], normal["closest_change"] or 0.0
+        if change > DIFFERENT:
+            nearer = 'with "closest", nearer to boundary elements, loads change by up to about'
+            geometry += f": {nearer} {100 * change:.2g} %"
         lines += [
-            ("model error", f"about {model_error:.2g} of displacements  (due to point forces)"),
+            ("model error", f"about {error:.2g} of displacements  (due to point forces)"),
             ("crowding", f"{crowding:.3g}  (above 1 contact discs overlap)"),
-            *([("bodies", beta)] if beta else []),
+        ]
+        if beta := normal["mismatch"]:
+            tractions = f"shear tractions of about {abs(100 * beta):.2g} % of the pressure"
+            neglected = f"Dundurs' beta = {beta:.3g}, neglected: it causes {tractions}"
+            lines.append(("bodies", neglected))
+        lines += [
             ("contact area", f"{normal['area']:.4g} {unit_of('area', units)}".rstrip()),
-            ("mean pressure", _described_pressure(normal, units)),
-            ("geometry", _described_geometry(normal)),
+            ("mean pressure", pressure),
+            ("geometry", geometry),
             ("contact modulus", plausibility.described_modulus(normal["contact_modulus"], units)),
             ("solver", f"{normal['solver']}, {steps}"),
             ("influence", INFLUENCES[normal["influence"]]),
         ]
     return labelled(lines)
-
-
-def _neglected(normal: Summary) -> str:
-    if not (beta := normal["mismatch"]):
-        return ""
-    return (
-        f"Dundurs' beta = {beta:.3g}, neglected: it causes shear tractions of about "
-        f"{abs(100 * beta):.2g} % of the pressure"
-    )
-
-
-def _described_pressure(normal: Summary, units: UnitNames) -> str:
-    unit = units.unit("pressure")
-    known = f"at most {normal['mean_pressure']:.4g} {unit.name if unit else ''}".rstrip()
-    return known if normal["hardness"] else f"{known}  (no hardness given: yield is not checked)"
-
-
-def _described_geometry(normal: Summary) -> str:
-    change, name = normal["closest_change"] or 0.0, str(normal["geometry"])
-    if change <= DIFFERENT:
-        return name
-    return (
-        f'{name}: with "closest", nearer to boundary elements, loads change by up to about '
-        f"{100 * change:.2g} %"
-    )
-
-
-def _ratio(error: float, largest: float) -> str:
-    if largest == 0 or not math.isfinite(error):
-        return ""
-    return f"  ({bound(error / largest)} of the largest load)"

@@ -1,9 +1,8 @@
-"""[path] and [steady]: paths of normal load and shear force, followed once or repeated."""
+"""Paths of load and shear force: [path], once; [steady], repeated; [shakedown], scaled."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from functools import cached_property
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -12,32 +11,15 @@ from pydantic import Field
 from convexrough import checks, plots
 from convexrough.contact import Contact
 from convexrough.errors import blamed_on
-from convexrough.friction.fretting import Fretting, fretting, fretting_columns
+from convexrough.friction.fretting import fretting, fretting_columns
 from convexrough.friction.path import load_path
 from convexrough.friction.phases import PhaseLosses, elliptic_path, phase_losses
 from convexrough.friction.steady import steady
+from convexrough.melan.shakedown import Theory, shakedown
 from convexrough.record import rows_of
-from convexrough.run.stage import (
-    MOST_PRINTED,
-    STATUSES,
-    Columns,
-    Result,
-    Stage,
-    Steps,
-    Summary,
-    numbers_of,
-    plain,
-    same,
-)
-from convexrough.run.values import (
-    FileTable,
-    Finite,
-    Mistake,
-    NonNegative,
-    Phase,
-    Positive,
-    expected,
-)
+from convexrough.run import values
+from convexrough.run.stage import STATUSES, Columns, Result, Stage, Steps, Summary, heads, numbers
+from convexrough.run.values import Finite, Mistake, Phase, Positive, expected
 
 COUNTS = tuple(status for status in STATUSES if status != "contact")
 
@@ -45,7 +27,7 @@ COUNTS = tuple(status for status in STATUSES if status != "contact")
 CHORDS_ERROR = 12
 
 
-class Ellipse(FileTable):
+class Ellipse(values.FileTable):
     """Chords of an elliptic path: normal load P + A cos t, shear force Q + B sin(t + phase).
 
     load : P;  load_amplitude : A;  force : Q;  force_amplitude : B;  chords : number of chords
@@ -62,7 +44,7 @@ class Ellipse(FileTable):
 class _Points(Stage):
     """The points of a path, or an ellipse. All loads and forces are multiples of `reference`."""
 
-    loads: list[NonNegative] | None = None
+    loads: list[values.NonNegative] | None = None
     forces: list[Finite] | None = None
     ellipse: Ellipse | None = None
     reference: Positive = 1.0
@@ -80,15 +62,15 @@ class _Points(Stage):
 
     @property
     def highest_load(self) -> float:
-        it = self.ellipse
-        own = [it.load + abs(it.load_amplitude)] if it is not None else self.loads or [0.0]
-        return self.reference * max(own)
+        if (it := self.ellipse) is not None:
+            return self.reference * (it.load + abs(it.load_amplitude))
+        return self.reference * max(self.loads or [0.0])
 
     @property
     def highest_force(self) -> float:
-        it = self.ellipse
-        own = [abs(it.force) + abs(it.force_amplitude)] if it is not None else self.forces or [0.0]
-        return self.reference * max(map(abs, own))
+        if (it := self.ellipse) is not None:
+            return self.reference * (abs(it.force) + abs(it.force_amplitude))
+        return self.reference * max(map(abs, self.forces or [0.0]))
 
     def points(self, contact: Contact) -> dict[str, Any]:
         """Load and shear force [force] at the points of the path."""
@@ -124,35 +106,27 @@ class PathStage(_Points):
 
 
 class PathResult(Steps):
-    """The result of [path]: the friction states at the points."""
-
     stage: PathStage
     title = "load path"
-    printed: ClassVar[Mapping[str, str]] = {
-        "load": "P",
-        "force": "Q",
-        **same("displacement", "loss", "stuck", "partial", "sliding"),
-    }
+    printed = heads("load: P, force: Q, displacement, loss, stuck, partial, sliding")
 
     def lines(self) -> list[str]:
         return [*super().lines(), *self.stage.chords()]
 
     def summary(self) -> Summary:
-        (path,) = self.found
-        return super().summary() | {"presses": path.presses}
+        return super().summary() | numbers(self.found[0], ("presses",))
 
     def tables(self) -> dict[str, Columns]:
         """A table of the points, and a table of all asperities at each point."""
         (path,) = self.found
         m, n = path.asperity_forces.shape
-        x, y = path.scene.asperities.positions.T
         names = ("asperity_loads", "asperity_forces", "asperity_force_errors",
                  "asperity_displacements", "drifts", "status")  # fmt: skip
-        each = {
-            name.removeprefix("asperity_"): it.ravel() for name, it in path.columns(*names).items()
-        }
-        places = {"point": np.repeat(np.arange(m), n), "x": np.tile(x, m), "y": np.tile(y, m)}
-        return {**super().tables(), "path_asperities": places | each}
+        each = {"point": np.repeat(np.arange(m), n)}
+        each |= {name: np.tile(it, m) for name, it in self.at_asperities({}).items()}
+        for name, rows in path.columns(*names).items():
+            each[name.removeprefix("asperity_")] = rows.ravel()
+        return {**super().tables(), "path_asperities": each}
 
 
 class SteadyStage(_Points):
@@ -180,64 +154,48 @@ class SteadyStage(_Points):
     def compute(self, contact: Contact) -> SteadyResult:
         scene, influence = contact.scene, contact.influence
         with blamed_on(f"[{self.name}]"):
-            found = [steady(scene, **self.points(contact), influence=influence)]
-            return SteadyResult(self, contact, (*found, *self._losses(contact)))
-
-    def _losses(self, contact: Contact) -> Iterator[PhaseLosses]:
-        if self.phases and self.ellipse is not None:
-            shape = self.ellipse.model_dump(exclude={"phase", "chords"})
-            yield phase_losses(
-                contact.scene,
-                **{name: self.reference * size for name, size in shape.items()},
-                phases=self.phases,
-                factors=self.factors,
-                chords=self.ellipse.chords,
-                influence=contact.influence,
-            )
+            found: list[Any] = [steady(scene, **self.points(contact), influence=influence)]
+            if self.phases and self.ellipse is not None:
+                shape = self.ellipse.model_dump(exclude={"phase", "chords"})
+                how = {name: self.reference * size for name, size in shape.items()}
+                how |= {"chords": self.ellipse.chords, "influence": influence}
+                losses = phase_losses(scene, phases=self.phases, factors=self.factors, **how)
+                found.append(losses)
+            return SteadyResult(self, contact, tuple(found))
 
 
 class SteadyResult(Result):
-    """The result of [steady]: the steady cycle, and losses at other phases if requested."""
-
     stage: SteadyStage
-    printed: ClassVar[Mapping[str, str]] = {
-        "level": "stuck below load",
-        "loss": "loss",
-        "loss_error": "error",
-        **same("partial", "sliding", "intermittent"),
-    }
-
-    def rows(self) -> list[Summary]:
-        return [numbers_of(self.found[0], self.stage.numbers)]
+    most = Steps.most
+    printed = heads(
+        "level: stuck below load, loss, loss_error: error, partial, sliding, intermittent"
+    )
 
     def summary(self) -> Summary:
-        found = self.found[0]
-        said = self.known[0] | {"order": found.order, "presses": found.presses}
-        for losses in self.found[1:]:
-            lists = {name: plain(values) for name, values in _by_phase(losses).items()}
+        said = self.known[0] | numbers(self.found[0], ("order", "presses"))
+        for losses, columns in self.by_phase:
+            lists = {name: it.tolist() for name, it in columns.items()}
             said |= {"phase_losses": lists | {"order": losses.order}}
         return said
 
-    @cached_property
-    def worn(self) -> Fretting:
-        """The slip, losses and tractions of each asperity in the steady cycle."""
-        return fretting(self.found[0])
+    @property
+    def by_phase(self) -> list[tuple[PhaseLosses, Columns]]:
+        """The losses at other phases, if requested, and their table."""
+        names = ("phases", "factors", "losses", "loss_errors", "smooth", "levels", "sliding")
+        return [(losses, losses.columns(*names)) for losses in self.found[1:]]
 
     def tables(self) -> dict[str, Columns]:
-        x, y = self.contact.scene.asperities.positions.T
-        columns = self.found[0].columns("slips", "stick_radii", "status")
-        worn = fretting_columns([self.worn])
-        tables = {"steady": {"x": x, "y": y, **columns}, "steady_fretting": worn}
-        for losses in self.found[1:]:
-            tables["phase_losses"] = _by_phase(losses)
-        return tables
+        columns = self.at_asperities(self.found[0].columns("slips", "stick_radii", "status"))
+        worn = fretting_columns([fretting(self.found[0])])
+        more = [("phase_losses", columns) for _, columns in self.by_phase]
+        return {"steady": columns, "steady_fretting": worn, **dict(more)}
 
     def lines(self) -> list[str]:
         said = [*super().lines(), *self.stage.chords()]
-        for losses in self.found[1:]:
-            printed = {**same("phase", "factor", "loss"), "smooth": "smooth sphere"}
-            rows, title = rows_of(_by_phase(losses)), "loss against phase"
-            said += ["", *self.printed_table("phase_losses", rows, printed, title, MOST_PRINTED)]
+        for _, columns in self.by_phase:
+            printed = heads("phase, factor, loss, smooth: smooth sphere")
+            rows, title = rows_of(columns), "loss against phase"
+            said += ["", *self.printed_table("phase_losses", rows, printed, title)]
         return said
 
     def figures(self) -> Mapping[str, Any]:
@@ -247,6 +205,87 @@ class SteadyResult(Result):
         return figures
 
 
-def _by_phase(losses: PhaseLosses) -> Columns:
-    names = ("phases", "factors", "losses", "loss_errors", "smooth", "levels", "sliding")
-    return losses.columns(*names)
+class ShakedownStage(Stage):
+    """Mean load and shear force, and amplitudes that are scaled, all divided by `reference`.
+
+    kind : "exact" (default), "elastic", or "vector": then forces are pairs [x, y]
+    """
+
+    name = "shakedown"
+    numbers = ("factor", "lower", "upper", "gross")
+
+    load: Positive
+    force: values.Force = 0.0
+    load_amplitudes: list[Finite] | None = None
+    force_amplitudes: list[values.Force]
+    kind: Annotated[Theory, expected('"exact", "elastic" or "vector"')] = "exact"
+    reference: Positive = 1.0
+
+    def mistakes_within(self) -> Iterator[Mistake]:
+        if self.load_amplitudes and len(self.load_amplitudes) != len(self.force_amplitudes):
+            found = f"found {len(self.load_amplitudes)} values"
+            yield "load_amplitudes", f"{found}, expected {len(self.force_amplitudes)}"
+        pairs = self.kind == "vector"
+        expected = 'a pair [x, y] with kind = "vector"' if pairs else values.NUMBER_OR_PAIR
+        if isinstance(self.force, list) != pairs and self.force != 0.0:
+            yield "force", f"found {self.force}, expected {expected}"
+        for i, force in enumerate(self.force_amplitudes):
+            if isinstance(force, list) != pairs:
+                yield f"force_amplitudes[{i}]", f"found {force}, expected {expected}"
+
+    @property
+    def highest_load(self) -> float:
+        """[force] the largest load of the path with the factor 1."""
+        return self.reference * (self.load + max([0.0, *(self.load_amplitudes or [])]))
+
+    def compute(self, contact: Contact) -> ShakedownResult:
+        forces = {
+            "load": self.load,
+            "force": self.force,
+            "load_amplitudes": self.load_amplitudes or [0.0] * len(self.force_amplitudes),
+            "force_amplitudes": self.force_amplitudes,
+        }
+        given: Any = {name: self.reference * np.array(it) for name, it in forces.items()}
+        with blamed_on(f"[{self.name}]"):
+            found = shakedown(contact.scene, **given, kind=self.kind, influence=contact.influence)
+        return ShakedownResult(self, contact, (found,))
+
+
+class ShakedownResult(Result):
+    stage: ShakedownStage
+    digits = 12
+    printed = heads("factor, lower: lower bound, upper: upper bound, gross: gross sliding")
+
+    def summary(self) -> Summary:
+        (found,) = self.found
+        more = numbers(found, ("limited_by", "proved", "order"))
+        return {"kind": found.kind, **self.known[0], **more}
+
+    def tables(self) -> dict[str, Columns]:
+        """The tables of the residual state and the mechanism, by vertex and component."""
+        (found,) = self.found
+        columns = self.at_asperities({"factor": found.factors})
+        if found.kind != "vector":
+            return {self.name: columns | {"witness": found.witness, "slip": found.mechanism}}
+        columns |= {f"witness_{name}": found.witness[:, k] for k, name in enumerate("xy")}
+        for v, slips in enumerate(found.mechanism):
+            columns |= {f"slip_{v}_{name}": slips[:, k] for k, name in enumerate("xy")}
+        return {self.name: columns}
+
+    def doubts(self) -> Iterator[str]:
+        yield from super().doubts()
+        if not self.found[0].proved:
+            yield "not proved: bounds on the limit of [shakedown]"
+
+    def lines(self) -> list[str]:
+        _, *table = super().lines()
+        (found,) = self.found
+        above = {
+            "sliding": "above the factor an asperity slides in every cycle",
+            "opening": "above the factor an asperity opens in every cycle, and need not slide",
+            None: "sliding dies out at every factor",
+        }
+        return [f"shakedown  ({self.stage.kind}), {above[found.limited_by]}", *table]
+
+    def figures(self) -> Mapping[str, Any]:
+        return plots.shakedown_figures(self.found[0])
