@@ -88,7 +88,7 @@ def loops_figure(
     scale: Scale,
     count: int = 1,
 ) -> Figure:
-    """The figure of loops: the contact, the same less its elastic part, and single asperities.
+    """The figure of loops: the contact, the same less a linear part Q / k, and single asperities.
 
     named, meaning : names of asperities in the legend, with their indices; its title
     count : number of all cycles, of which only `cycles` are drawn
@@ -110,7 +110,7 @@ def loops_figure(
     upright.set_xlim(right=upright.get_xlim()[1] + 0.22 * np.ptp(upright.get_xlim()))
     which = f": {len(cycles)} of {count}" if count > len(cycles) else ""
     style.title(whole, f"whole contact{which}")
-    style.title(upright, "less its elastic part")
+    style.title(upright, "less a linear part")
     _draw_asperity_loops(single, loops[-1], list(named), scale)
     style.title(single, f"asperities, $Q/(fP)$ = {_range(cycles[-1], scale)}")
     single.legend(title=meaning, loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=TICK,
