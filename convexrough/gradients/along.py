@@ -17,6 +17,7 @@ from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair
@@ -42,9 +43,8 @@ PAST, AGREES = Fraction(1, 2**36), 2.0**-20
 #: A difference of one-sided derivatives below this part of the largest derivative is neglected.
 NEGLIGIBLE = 2.0**-40
 
-#: The weights of V, D0 and S at one level in a weighted sum.
-Weights: TypeAlias = tuple[Fraction, ...]
-NOTHING: Weights = (Fraction(0),) * 3
+#: The weights of V, D0 and S at one level in a weighted sum: three rational numbers.
+Weights: TypeAlias = NDArray[np.object_]
 
 #: For each segment: index of its end point, weight of its loss, weight of the final displacement.
 Steps: TypeAlias = Sequence[tuple[int, Fraction, Fraction]]
@@ -59,10 +59,10 @@ NONE = Ball(Pair.exact(np.nan), np.asarray(np.inf))
 class Sums(dict[Fraction, Weights]):
     """The weights of V, D0 and S at each level."""
 
-    def add(self, level: Fraction, weight: Fraction, energy: Fraction, approach: Fraction) -> None:
-        """Add weights of V and D0, multiplied by `weight`."""
-        V, D, S = self.get(level, NOTHING)
-        self[level] = (V + weight * energy, D + weight * approach, S)
+    def add(self, level: Fraction, *weights: Fraction) -> None:
+        """Add weights of V, D0 and, if given, S."""
+        padded = np.array((*weights, Fraction(0))[:3])
+        self[level] = self[level] + padded if level in self else padded
 
     def add_loss(self, piece: Piece, weight: Fraction) -> None:
         """Add the loss (1 - c th) I on a piece times a weight; I is (4) of docs/theory/losses.md.
@@ -75,14 +75,27 @@ class Sums(dict[Fraction, Weights]):
         """
         weight *= 1 - piece.sign * piece.slope
         high, low, before, after = piece[2:]
-        run, fall = high - low, before - after
-        self.add(high, weight, 2 - fall / run, before - high)
-        self.add(low, weight, fall / run - 2, low - after)
+        run, fall = weight * (high - low), before - after
+        energy = weight * (2 - fall / (high - low))
+        self.add(high, energy, weight * (before - high))
+        self.add(low, -energy, weight * (low - after))
         if fall == 0:
-            self.add(before, weight, Fraction(0), -run)
+            self.add(before, Fraction(0), -run)
         else:
-            self.add(before, weight, -run / fall, Fraction(0))
-            self.add(after, weight, run / fall, Fraction(0))
+            self.add(before, -run / fall, Fraction(0))
+            self.add(after, run / fall, Fraction(0))
+
+    def gather(self, others: Sums, reach: Fraction) -> None:
+        """Add other weights, expanded about the nearest level here if it is within `reach`."""
+        places = sorted(self)
+        for level, (V, D, S) in others.items():
+            k = bisect(places, level)
+            around = places[max(k - 1, 0) : k + 1]
+            place = min(around, key=lambda each: abs(each - level), default=level)
+            if abs(off := level - place) > reach or not around:
+                place, off = level, Fraction(0)
+                insort(places, level)
+            self.add(place, V, D + V * off, S + D * off + V * off * off / 2)
 
 
 @dataclass(frozen=True)
@@ -121,7 +134,7 @@ class Along:
             if displacement:
                 for level, bend in curve.bends:
                     if bend:
-                        moved.add(level, displacement, Fraction(0), bend)
+                        moved.add(level, Fraction(0), displacement * bend)
         return lost, moved
 
     def parts(self, moves: Moves) -> tuple[list[Part], list[Part]]:
@@ -180,7 +193,12 @@ class Along:
         factors = self.known.loss_unit, self.known.travel_unit * force
         for mine, base, there, factor in zip(self.sums, *both, factors, strict=True):
             slopes = _slopes(base, there, unit, by)
-            for level, (V, D, S) in (_near(slopes, mine, 4 * off) if off else slopes).items():
+            if off:
+                slopes, near = Sums({level: 0 * it for level, it in mine.items()}), slopes
+                slopes.gather(near, 4 * off)
+            for level, (V, D, S) in slopes.items():
+                if not (V or D or S):
+                    continue
                 unloaded = level <= NEAR * unit
                 if unloaded and S:
                     return NONE
@@ -230,43 +248,15 @@ def _one(below: Ball, above: Ball) -> Ball:
     return Ball.around((below + above).mid, apart.size) * 0.5 if apart.size else below
 
 
-def _moved(weights: Weights, off: Fraction) -> Weights:
-    """The weights moved down by `off`: V, D0 and S are expanded about the lower level."""
-    V, D, S = weights
-    return V, D + V * off, S + D * off + V * off * off / 2
-
-
-def _near(weights: dict[Fraction, Weights], levels: Sums, reach: Fraction) -> Sums:
-    """The weights moved to the nearest of these levels if it is within `reach`."""
-    found = Sums()
-    for level, each in weights.items():
-        nearest = min(levels, key=lambda place: abs(place - level), default=level)
-        place = nearest if abs(nearest - level) <= reach else level
-        both = zip(found.get(place, NOTHING), _moved(each, level - place), strict=True)
-        found[place] = tuple(b + m for b, m in both)
-    return found
-
-
-def _slopes(base: Sums, moved: Sums, unit: Fraction, by: Fraction) -> dict[Fraction, Weights]:
+def _slopes(base: Sums, moved: Sums, unit: Fraction, by: Fraction) -> Sums:
     """(moved - base) / by, as weights of V, D0 and S at levels of the original path.
 
     unit : the largest load; weights that are tiny in this unit are neglected
     """
-    places, found = sorted(base), dict[Fraction, Weights]()
-    for sign, weights in ((-1, base), (1, moved)):
-        for level, each in weights.items():
-            near = bisect(places, level)
-            around = [*places[max(near - 1, 0) : near + 1], level]
-            at = next(place for place in around if abs(place - level) <= NEAR * unit)
-            if at is level:  # no level of the original path corresponds
-                insort(places, at)
-            both = zip(found.get(at, NOTHING), _moved(each, level - at), strict=True)
-            found[at] = tuple(b + sign * m for b, m in both)
-    slopes = {level: tuple(w / by for w in weights) for level, weights in found.items()}
-    sizes = [abs(w) / unit**k for weights in slopes.values() for k, w in enumerate(weights)]
-    least = NEAR * max(sizes, default=Fraction(0))
-    nonzero = {
-        level: tuple(w if abs(w) > least * unit**k else Fraction(0) for k, w in enumerate(weights))
-        for level, weights in slopes.items()
-    }
-    return {level: weights for level, weights in nonzero.items() if any(weights)}
+    slopes = Sums({level: -weights for level, weights in base.items()})
+    slopes.gather(moved, NEAR * unit)
+    scale = by * np.array([Fraction(1), unit, unit**2])
+    least = NEAR * max((abs(weights / scale).max() for weights in slopes.values()), default=0)
+    for level, weights in slopes.items():
+        slopes[level] = np.where(abs(weights / scale) > least, weights / by, 0 * weights)
+    return slopes
