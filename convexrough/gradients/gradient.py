@@ -46,42 +46,38 @@ class Number:
     sides  : for "forces" or "loads" of a path, (m, 2) derivatives from below and from above
     """
 
-    contact: Contact
     top: Level
     value: Ball
     parts: Sequence[Part]
-    slopes: Mapping[str, Ball]
+    slopes: Moves
     steep: Mapping[str, float]
-    sides: Mapping[str, Array] = field(default_factory=dict)
+    sides: Mapping[str, Array]
 
     @classmethod
     def of(
-        cls,
-        contact: Contact,
-        top: Level,
-        value: Ball,
-        parts: Sequence[Part],
-        explicit: Moves,
-        sides: Mapping[str, Array] | None = None,
+        cls, top: Level, value: Ball, parts: Sequence[Part], explicit: Moves, **sides: Array
     ) -> Number:
-        """The number with these parts.
-
-        explicit : derivatives by parameters at fixed levels
-        """
+        """The number with these parts; `explicit` has its derivatives at fixed levels."""
         slopes, steep = dict(explicit), dict[str, float]()
         for part in parts:
             for name, rate in part.moves.items():
                 slopes[name] = slopes.get(name, ZERO) + part.slopes.load * rate
                 if part.level.trial is None and part.weight.size > 0.0:
                     steep[name] = float((part.weight * rate).value)
-        return cls(contact, top, value, parts, slopes, steep, sides or {})
+        return cls(top, value, parts, slopes, steep, sides)
 
-    def times(self, factor: Ball, slopes: Mapping[str, Ball]) -> Number:
-        """The number times a factor; `slopes` are the number times derivatives of the factor."""
+    def times(self, factor: Ball, **slopes: Ball) -> Number:
+        """The number times a factor; `slopes` are the number times derivatives of the factor.
+
+        Only for numbers whose parts have no weights of P and n.
+        """
         both = {name: slope * factor for name, slope in self.slopes.items()}
         for name, slope in slopes.items():
             both[name] = both.get(name, ZERO) + slope
-        parts = [part.times(factor) for part in self.parts]
+        parts = [
+            replace(part, energy=factor * part.energy, approach=factor * part.approach)
+            for part in self.parts
+        ]
         return replace(self, value=self.value * factor, parts=parts, slopes=both)
 
     def holding_the_approach(self) -> Number:
@@ -92,9 +88,8 @@ class Number:
         slopes, units = dict(self.slopes), self.top.problem.units
         by_approach = slopes.pop("load", ZERO) * units.force / self.top.tangent.approach
         slopes["approach"] = by_approach / units.length
-        return replace(
-            self, parts=[*self.parts, Part(self.top, approach=-by_approach)], slopes=slopes
-        )
+        parts = [*self.parts, Part(self.top, approach=-by_approach)]
+        return replace(self, parts=parts, slopes=slopes)
 
     @cached_property
     def geometry(self) -> Geometry:
@@ -103,17 +98,17 @@ class Number:
     @cached_property
     def offsets(self) -> Ball:
         """(n,) derivatives by the offsets d."""
-        zero = Ball.exact(np.zeros(len(self.top.problem)))
-        return (
-            sum((part.slopes.offsets for part in self.parts), start=zero)
-            / self.top.problem.units.length
-        )
+        scaled = sum((part.slopes.offsets for part in self.parts), start=self._zero)
+        return scaled / self.top.problem.units.length
 
     @cached_property
     def local(self) -> Ball:
         """(n,) derivatives by log k."""
-        zero = Ball.exact(np.zeros(len(self.top.problem)))
-        return sum((part.slopes.local for part in self.parts), start=zero)
+        return sum((part.slopes.local for part in self.parts), start=self._zero)
+
+    @property
+    def _zero(self) -> Ball:
+        return Ball.exact(np.zeros(len(self.top.problem)))
 
     @cached_property
     def coupled(self) -> Ball:
@@ -124,10 +119,8 @@ class Number:
     def turning(self) -> Ball:
         """(n, 2) derivatives by the contact points c, on which A depends."""
         n, turned = len(self.offsets), [(part.slopes.left, part.level.loads) for part in self.parts]
-        carrying = np.zeros(n, dtype=bool)
-        for left, loads in turned:
-            carrying |= (left.size > 0) | (loads.size > 0)
-        which = np.flatnonzero(carrying)
+        sizes = [each.size for pair in turned for each in pair]
+        which = np.flatnonzero(sum(sizes, start=np.zeros(n)))
         total = Ball.exact(np.zeros((len(which), 2)))
         turned = [(left[which], loads[which]) for left, loads in turned if left.size.any()]
         slopes = iter(self.geometry.slopes([each for pair in turned for each in pair], which))
@@ -151,7 +144,7 @@ class Number:
     @property
     def whole(self) -> dict[str, Ball]:
         """The number, and its derivatives by parameters of the whole scene or state, by name."""
-        scene, slopes = self.contact.scene, self.slopes
+        scene, slopes = self.top.problem.scene, self.slopes
         modulus = (self.local.sum() * -2.0 / 3.0 - self.coupled) / scene.material.contact_modulus
         found = {"value": self.value, "poisson_ratio": slopes.get("poisson_ratio", ZERO)}
         found |= {name: slopes[name] for name in WHOLE if name in slopes}
@@ -184,13 +177,11 @@ class Number:
 class Gradient(Table, Plottable):
     """Derivatives of one number with respect to a scene and the prescribed quantities.
 
-    docs/theory/gradients.md derives them.
-
     The unit of a derivative is the unit of the number over the unit of the parameter. Each
     derivative is at constant values of the other parameters named here. So shear forces Q are
-    constant, but the fractions Q / (f P) and the displacements are not. docs/theory/gradients.md,
-    "Derivatives at a prescribed approach or displacement", tells how to keep a displacement
-    constant.
+    constant, but the fractions Q / (f P) and the displacements are not. docs/theory/gradients.md
+    derives them; "Derivatives at a prescribed approach or displacement" there tells how to keep a
+    displacement constant.
 
     Attributes that end in `_error` or `_errors` are proved bounds on the errors of the derivatives,
     including all rounding, for the given float64 data of the scene. They are infinite if the
@@ -269,7 +260,7 @@ class Gradient(Table, Plottable):
     load_sides: Array | None = None
 
     @classmethod
-    def of(cls, number: Number, holding: Holding) -> Gradient:
+    def of(cls, contact: Contact, number: Number, holding: Holding) -> Gradient:
         """The gradient of a number, in the scene's units."""
         shown = number.holding_the_approach() if holding == "approach" else number
         found: dict[str, Any] = {}
@@ -284,7 +275,7 @@ class Gradient(Table, Plottable):
             found[f"{one}_sides"] = frozen(sides)
         tips = shown.along(shown.geometry.by_tip)
         return cls(
-            contact=shown.contact,
+            contact=contact,
             holding=holding,
             heights=shown.in_scene(shown.offsets.value),
             height_errors=shown.in_scene(shown.offsets.error),
@@ -331,14 +322,15 @@ class Gradient(Table, Plottable):
             whole = 1.0 / reference.energy_scale
             factor = Ball.around(whole, 1e-13 * whole)
         value = number.value * factor
-        slopes = {
-            "sphere_radius": value / (R * 3.0),
-            "contact_modulus": value * 2.0 / (E * 3.0),
-            "poisson_ratio": -value / ((1.0 - nu) * (2.0 - nu)),
-            "friction": value * -2.0 / f,
-            "load": value * -5.0 / (P * 3.0),
-        }
-        return Gradient.of(number.times(factor, slopes), self.holding)
+        normalised = number.times(
+            factor,
+            sphere_radius=value / (R * 3.0),
+            contact_modulus=value * 2.0 / (E * 3.0),
+            poisson_ratio=-value / ((1.0 - nu) * (2.0 - nu)),
+            friction=value * -2.0 / f,
+            load=value * -5.0 / (P * 3.0),
+        )
+        return Gradient.of(self.contact, normalised, self.holding)
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         """The printed rows, without parameters that are None."""

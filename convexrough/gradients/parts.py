@@ -10,7 +10,7 @@ docs/theory/gradients.md. The names v, w and lambda in this module are those of 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple, TypeAlias
 
@@ -116,10 +116,6 @@ class Part:
         local = (own * 3.0 / 5.0 - moved) * level.indentation.positive_part()
         return Slopes(lifted - own, local, own * 0.5 - lifted, by_load)
 
-    def times(self, factor: Ball) -> Part:
-        """This part times a factor. Only for parts that have no weights of P and n."""
-        return replace(self, energy=factor * self.energy, approach=factor * self.approach)
-
 
 def _first_touch(level: Level, weight: Ball, w: Ball | None) -> tuple[Ball, Ball]:
     """Coefficients of dd and dL at the load 0, where D0 is -d_i of the first asperity to touch."""
@@ -134,15 +130,9 @@ def _first_touch(level: Level, weight: Ball, w: Ball | None) -> tuple[Ball, Ball
 
 
 def product(level: Level, weights: Ball) -> Ball:
-    """A times weights, as balls.
-
-    The radii of the weights increase each error bound by the sum of the radii times the largest
-    entry of A.
-    """
-    problem = level.problem
-    coupled = problem.product(weights.mid)
-    if weights.radius.any():
-        coupled = Ball.around(
-            coupled.mid, coupled.radius + weights.radius.sum() * problem.largest_entry
-        )
-    return coupled
+    """A times weights. Radii count as if all entries of A were the largest one."""
+    coupled = level.problem.product(weights.mid)
+    if not weights.radius.any():
+        return coupled
+    spread = weights.radius.sum() * level.problem.largest_entry
+    return Ball.around(coupled.mid, coupled.radius + spread)

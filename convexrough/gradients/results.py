@@ -25,7 +25,6 @@ from convexrough.errors import InputError, ProofError
 from convexrough.friction.cycle import Cycle
 from convexrough.friction.levels import FrictionLevels
 from convexrough.friction.onset import indices, root
-from convexrough.friction.order import Order
 from convexrough.friction.path import LoadPath
 from convexrough.friction.shear import ShearState
 from convexrough.gradients.along import NONE, Along
@@ -111,7 +110,7 @@ def contact_gradient(
         moves=by_load(units),
     )
     explicit = {} if contact.scene.friction is None else {"friction": ZERO}
-    return Gradient.of(Number.of(contact, top, part.value, [part], explicit), holding)
+    return Gradient.of(contact, Number.of(top, part.value, [part], explicit), holding)
 
 
 def state_gradient(
@@ -137,7 +136,7 @@ def state_gradient(
     moved = weight * (top.approach - low.approach) + slid.dot(low.indentation)
     borne = carried.dot(top.loads - low.loads)
     explicit = at_fixed_levels(known, displacement=moved, force=borne)
-    return Gradient.of(Number.of(contact, top, moved + borne, parts, explicit), holding)
+    return Gradient.of(contact, Number.of(top, moved + borne, parts, explicit), holding)
 
 
 def onset_gradient(contact: Contact, asperity: int, *, holding: Holding | None = None) -> Gradient:
@@ -179,7 +178,7 @@ def onset_gradient(contact: Contact, asperity: int, *, holding: Holding | None =
         said = f"{asperity}, which slides last, together with others"
         raise InputError("asperity", found=said, expected=expected)
     explicit = {"load": f, "friction": total / f}
-    return Gradient.of(Number.of(contact, top, total, parts, explicit), holding)
+    return Gradient.of(contact, Number.of(top, total, parts, explicit), holding)
 
 
 def _just_touching(known: Levels, place: int, near: Ball) -> tuple[Level, Ball]:
@@ -222,7 +221,7 @@ def cycle_gradient(cycle: Cycle, *, holding: Holding | None = None) -> Gradient:
         again = [((k + 1) % m, Fraction(1), Fraction(0)) for k in range(m)]
         loads = [Fraction(load) for load in cycle.loads.tolist()]
         along = Along(known, Fraction(0), first + again, loads, cycle.heights)
-        return _gradient(contact, along, holding, paths=True, order=cycle.order)
+        return _gradient(contact, along, holding, paths=True, sharp=cycle.order == "proved")
     amplitude = (max(cycle.heights) - min(cycle.heights)) / 2
     top, low = known.top, level_below(known, "maximum", amplitude, holding)
     T, mean = top.load - low.load, (top.approach + low.approach) * 0.5
@@ -237,7 +236,8 @@ def cycle_gradient(cycle: Cycle, *, holding: Holding | None = None) -> Gradient:
     explicit = at_fixed_levels(known, loss=W)
     for name in ("maximum", "minimum", "friction"):  # dT = dP - dL
         explicit[name] = explicit.get(name, ZERO) + weight * mean * moves[name]
-    return Gradient.of(_loss(Number.of(contact, top, W, parts, explicit), cycle.order), holding)
+    number = Number.of(top, W, parts, explicit)
+    return Gradient.of(contact, number if cycle.order == "proved" else _loose(number), holding)
 
 
 def path_gradient(
@@ -264,16 +264,17 @@ def path_gradient(
     if path.load_constant and any(curve.load == abs(curve.height) for curve in path.curves):
         expected = "forces below f P: in gross sliding a history has no derivative"
         raise InputError("forces", found="gross sliding", expected=expected)
-    order = path.order if spent.any() else "proved"
-    return _gradient(path.contact, along, holding, paths=not path.load_constant, order=order)
+    sharp = path.order == "proved" or not spent.any()
+    return _gradient(path.contact, along, holding, paths=not path.load_constant, sharp=sharp)
 
 
 def _gradient(
-    contact: Contact, along: Along, holding: Holding, *, paths: bool, order: Order
+    contact: Contact, along: Along, holding: Holding, *, paths: bool, sharp: bool
 ) -> Gradient:
     """The gradient of a weighted sum along a path.
 
     paths : True if the load varies: derivatives by the loads of all points are added
+    sharp : False for losses whose order is not proved
     """
     if paths and holding == "approach":
         expected = '"load", because the loads of all points are prescribed'
@@ -293,14 +294,13 @@ def _gradient(
     if paths:
         by_P = [(one, nothing) for one in each]
         explicit["loads"], sides["loads"] = along.slopes(by_P, Ball.exact(1.0))
-    parts = [*lost, *moved]
-    number = Number.of(contact, known.top, loss + far, parts, explicit, sides)
-    return Gradient.of(_loss(number, order), holding)
+    number = Number.of(known.top, loss + far, [*lost, *moved], explicit, **sides)
+    return Gradient.of(contact, number if sharp else _loose(number), holding)
 
 
-def _loss(number: Number, order: Order) -> Number:
-    """The number, a sum with losses; with infinite error bounds if order is not proved."""
-    return number if order == "proved" else number.times(Ball.around(1.0, np.inf), {})
+def _loose(number: Number) -> Number:
+    """The number with infinite error bounds."""
+    return number.times(Ball.around(1.0, np.inf))
 
 
 def _where_open(level: Level, weights: Array) -> Ball:
