@@ -25,13 +25,12 @@ from convexrough import checks, solvers
 from convexrough.arrays import Array
 from convexrough.contact import Contact, press
 from convexrough.errors import InputError, SolverError
-from convexrough.frames import Variables
 from convexrough.influence import Kind
 from convexrough.memory import MemoryRise
 from convexrough.normal.certificate import Certificate
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER, logged_steps
-from convexrough.record import LINE, Record, Table, in_text
+from convexrough.record import LINE, Record, Table, Variables, in_text
 from convexrough.scene.asperities import Asperities
 from convexrough.scene.material import Material
 from convexrough.scene.scene import Scene

@@ -19,14 +19,13 @@ from numpy.typing import ArrayLike
 from convexrough.arrays import Array
 from convexrough.contact import Contact
 from convexrough.errors import SolverError
-from convexrough.frames import Variables
 from convexrough.friction.conic_step import ConicStepper
 from convexrough.friction.order import Order
 from convexrough.friction.path import LoadPath, walk
 from convexrough.influence import Kind
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
-from convexrough.record import LINE, Record, Table
+from convexrough.record import LINE, Record, Table, Variables
 from convexrough.scene.scene import Scene
 
 Way = Literal["general step", "memory curve", "conic step"]
