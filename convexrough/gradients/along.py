@@ -43,20 +43,18 @@ PAST, AGREES = Fraction(1, 2**36), 2.0**-20
 #: A difference of one-sided derivatives below this part of the largest derivative is neglected.
 NEGLIGIBLE = 2.0**-40
 
-#: The weights of V, D0 and S at one level in a weighted sum: three rational numbers.
-Weights: TypeAlias = NDArray[np.object_]
+#: Rational numbers: the weights (3,) of V, D0 and S at a level, or P and T (m, 2) at m points.
+Exact: TypeAlias = NDArray[np.object_]
 
 #: For each segment: index of its end point, weight of its loss, weight of the final displacement.
 Steps: TypeAlias = Sequence[tuple[int, Fraction, Fraction]]
 
-#: Changes of P or of T at all points of a path, per unit of a parameter.
-Shifts: TypeAlias = Sequence[Fraction]
 
 #: The value of a derivative that does not exist or is infinite.
 NONE = Ball(Pair.exact(np.nan), np.asarray(np.inf))
 
 
-class Sums(dict[Fraction, Weights]):
+class Sums(dict[Fraction, Exact]):
     """The weights of V, D0 and S at each level."""
 
     def add(self, level: Fraction, *weights: Fraction) -> None:
@@ -100,23 +98,21 @@ class Sums(dict[Fraction, Weights]):
 
 @dataclass(frozen=True)
 class Along:
-    """A path through points, with weights of its losses and displacements.
-
-    known : the normal solutions of the contact
-    start : [force] load at which the path begins, without shear
-    steps : the segments and their weights
-    loads, heights : [force] P and T at the points
-    """
+    """A path through points, with weights of its losses and displacements."""
 
     known: FrictionLevels
-    start: Fraction
+    start: Fraction  # [force] load at which the path begins, without shear
     steps: Steps
-    loads: Sequence[Fraction]
-    heights: Sequence[Fraction]
+    points: Exact  # (m, 2) [force] P and T
+
+    @property
+    def unit(self) -> Fraction:
+        """[force] the largest load."""
+        return Fraction(self.points[:, 0].max())
 
     @cached_property
     def walk(self) -> Walk:
-        points = [(self.loads[k], self.heights[k]) for k, _, _ in self.steps]
+        points = [(*self.points[k],) for k, _, _ in self.steps]
         return Walk(self.known, MemoryCurve.pressed(self.start), points)
 
     @cached_property
@@ -161,32 +157,23 @@ class Along:
         vertices = {
             vertex for it in self.walk.curves for vertex in zip(it.levels, it.heights, strict=True)
         }
-        least = ROUNDED * max(self.loads)
+        least = ROUNDED * self.unit
         along = ({P + turn * T for P, T in vertices} for turn in (-1, 0, 1))
         return any(b - a < least for each in along for a, b in pairwise(sorted(each)))
 
-    def _shifted(self, loads: Shifts, heights: Shifts, by: Fraction) -> Along:
-        """The path after P and T at all points have changed by these shifts times `by`."""
-        return replace(
-            self,
-            loads=[load + by * each for load, each in zip(self.loads, loads, strict=True)],
-            heights=[T + by * each for T, each in zip(self.heights, heights, strict=True)],
-        )
-
-    def _one_side(
-        self, loads: Shifts, heights: Shifts, sign: int, times: Ball, off: Fraction = Fraction(0)
-    ) -> Ball:
-        """`times` times the derivative from above (sign 1) or below (-1), along these changes.
+    def _one_side(self, shift: Exact, sign: int, times: Ball, off: Fraction = Fraction(0)) -> Ball:
+        """`times` times the derivative from above (sign 1) or below (-1), along this shift.
 
         off : [force] distance by which the path is first shifted to the same side; the error bound
             does not include the effect of this shift
         """
-        unit, force = max(self.loads), self.known.units.force
-        longest = max(map(abs, (*loads, *heights))) or Fraction(1)
-        by = sign * SHIFT * unit / longest
+        unit, force = self.unit, self.known.units.force
+        scale = Fraction(sign) / (abs(shift).max() or 1)
+        by = scale * SHIFT * unit
         try:
-            origin = self._shifted(loads, heights, sign * off / longest) if off else self
-            both = origin.sums, origin._shifted(loads, heights, by).sums
+            origin = replace(self, points=self.points + off * scale * shift) if off else self
+            moved = replace(origin, points=origin.points + by * shift)
+            both = origin.sums, moved.sums
         except InputError:  # |T| > P, or a negative load
             return NONE
         total = ZERO
@@ -209,31 +196,31 @@ class Along:
                 total = total + factor * each
         return total * times
 
-    def slopes(
-        self, directions: Sequence[tuple[Shifts, Shifts]], factor: Ball
-    ) -> tuple[Ball, Array]:
-        """(m,) the derivatives along m directions, times `factor`; (m, 2) their one-sided values.
+    def slopes(self, shifts: Exact, factor: Ball) -> tuple[Ball, Array]:
+        """(k,) the derivatives along k shifts, times `factor`; (k, 2) those from below and above.
 
-        The one-sided values are the derivatives from below and from above. The derivative is their
-        mean if they agree within their error bounds. It is nan if they differ or one does not
-        exist. If the path is nearly tied, one-sided derivatives at the distance PAST are computed,
-        too. If these differ, they become the one-sided values, and the derivative is nan.
+        A derivative is the mean of its one-sided values if these agree within their error bounds.
+        It is nan if they differ or one does not exist. If the path is nearly tied, one-sided
+        values at the distance PAST are computed, too; if they differ, they are the result.
 
-        directions : changes of P and of T at all points
+        shifts : (k, m, 2) changes of P and T at m points per unit of a parameter
         """
-        sides = [[self._one_side(*each, sign, factor) for sign in (-1, 1)] for each in directions]
-        found = [_one(below, above) for below, above in sides]
-        values = np.array([[float(s.value) for s in both] for both in sides])
+
+        def sides(off: Fraction = Fraction(0)) -> list[list[Ball]]:
+            return [[self._one_side(it, sign, factor, off) for sign in (-1, 1)] for it in shifts]
+
+        def floats(of: list[list[Ball]]) -> Array:
+            return np.array([[float(side.value) for side in both] for both in of])
+
+        exact = sides()
+        found, values = [_one(*both) for both in exact], floats(exact)
         if self.nearly_tied:
-            off = PAST * max(self.loads)
-            past = np.array([[float(self._one_side(*each, sign, factor, off).value)
-                              for sign in (-1, 1)] for each in directions])  # fmt: skip
+            past = floats(sides(PAST * self.unit))
             past = np.where(np.isnan(past), values, past)  # where a side does not exist
             below, above = past.T
             size = np.fmax.reduce(np.abs(past), axis=None, initial=0.0)
-            tied = np.abs(above - below) > AGREES * np.fmax(np.abs(below), np.abs(above)) + (
-                NEGLIGIBLE * size
-            )
+            allowed = AGREES * np.fmax(np.abs(below), np.abs(above)) + NEGLIGIBLE * size
+            tied = np.abs(above - below) > allowed
             for k in np.flatnonzero([float(each.error) > AGREES * size for each in found] | tied):
                 near, fine, values[k] = past[k].mean(), found[k], past[k]
                 known = Ball.around(near, float(fine.error) + abs(float(fine.value) - near))
@@ -255,8 +242,8 @@ def _slopes(base: Sums, moved: Sums, unit: Fraction, by: Fraction) -> Sums:
     """
     slopes = Sums({level: -weights for level, weights in base.items()})
     slopes.gather(moved, NEAR * unit)
-    scale = by * np.array([Fraction(1), unit, unit**2])
-    least = NEAR * max((abs(weights / scale).max() for weights in slopes.values()), default=0)
+    powers = by * np.array([Fraction(1), unit, unit**2])
+    least = NEAR * max((abs(weights / powers).max() for weights in slopes.values()), default=0)
     for level, weights in slopes.items():
-        slopes[level] = np.where(abs(weights / scale) > least, weights / by, 0 * weights)
+        slopes[level] = np.where(abs(weights / powers) > least, weights / by, 0 * weights)
     return slopes
