@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, TypeAlias
@@ -230,7 +231,8 @@ def _of_array(values: NDArray[Any]) -> str:
     if values.size == 0:
         return "none"
     if values.dtype.kind == "U":
-        return ", ".join(_counted(values.ravel()))
+        counts = Counter(values.ravel().tolist())
+        return ", ".join(f"{count:,} {status}" for status, count in counts.items())
     if values.dtype.kind == "b":
         return f"{np.count_nonzero(values):,} of {values.size:,}"
     if values.size <= FEW:
@@ -240,10 +242,3 @@ def _of_array(values: NDArray[Any]) -> str:
         return f"{size} indices: {', '.join(map(str, values.ravel()[:FEW]))}, ..."
     low, high = np.fmin.reduce(values, axis=None), np.fmax.reduce(values, axis=None)
     return f"{size} from {low:.6g} to {high:.6g}"
-
-
-def _counted(statuses: NDArray[np.str_]) -> Iterator[str]:
-    while len(statuses):
-        same = statuses == statuses[0]
-        yield f"{np.count_nonzero(same):,} {statuses[0]}"
-        statuses = statuses[~same]

@@ -29,12 +29,10 @@ Moves: TypeAlias = Mapping[str, Ball]
 class Slopes(NamedTuple):
     """The derivative of a `Part`:  offsets^T dd + local^T dlog k + left^T dA P + load dL.
 
-    offsets, local, left : (n,) coefficients in this derivative
-    load  : coefficient of the change dL of the total load L. At L = 0 the term of D0 is left out,
-        because dD0/dL is infinite there
+    At the total load L = 0 the term of D0 is left out of `load`, because dD0/dL is infinite there.
     """
 
-    offsets: Ball
+    offsets: Ball  # this and the following two are (n,)
     local: Ball
     left: Ball
     load: Ball
@@ -44,20 +42,15 @@ class Slopes(NamedTuple):
 class Part:
     """The part of a result that belongs to one level: a weighted sum of V, D0, P and n.
 
-    energy, approach : weights of V and D0
-    loads, indentations : (n,) weights of P and n
-    moves : derivatives of the level's total load with respect to the prescribed load and forces and
-        the coefficient of friction, by name
-
     The weights include the conversion from the scaled units of the level to the unit of the result.
     """
 
     level: Level
-    energy: Ball = ZERO
-    approach: Ball = ZERO
-    loads: Ball | None = None
-    indentations: Ball | None = None
-    moves: Moves = field(default_factory=dict)
+    energy: Ball = ZERO  # weight of V
+    approach: Ball = ZERO  # weight of D0
+    loads: Ball | None = None  # (n,) weights of P
+    indentations: Ball | None = None  # (n,) weights of n
+    moves: Moves = field(default_factory=dict)  # of this level
 
     @property
     def scaled(self) -> Ball:
@@ -75,10 +68,7 @@ class Part:
 
     @property
     def weight(self) -> Ball:
-        """The total weight of D0: `approach` plus the sum of `indentations`.
-
-        D0 also enters through the indentations n_i = D0 + d_i - (A P)_i.
-        """
+        """The weight of D0 in total, as D0 is also part of the indentations D0 + d - A P."""
         v = self.indentations
         return self.approach if v is None else self.approach + v.sum()
 
@@ -92,15 +82,20 @@ class Part:
     def slopes(self) -> Slopes:
         """The derivative of the weighted sum.
 
-        Raises InputError if the sum has no derivative: at the load 0, if several asperities may
-        touch first.
+        Raises InputError at the load 0 if several asperities may touch first.
         """
         level, v, w, weight = self.level, self.indentations, self.loads, self.weight
         zero = Ball.exact(np.zeros(len(level.problem)))
         own, by_load = self.energy * level.loads, self.energy * level.approach
-        if level.trial is None:
-            moved, jump = _first_touch(level, weight, w)
+        if level.trial is None:  # the load 0, where D0 is -d_i of the first asperity to touch
+            offsets = level.problem.exact.offsets
+            first = offsets.upper >= offsets.lower.max()
+            if np.count_nonzero(first) > 1:
+                expected = "a force below f P, as several asperities slide last, at the same force"
+                raise InputError("force", found="gross sliding", expected=expected)
+            moved = where(first, zero - weight, zero)
             lifted = moved if v is None else moved + v
+            jump = ZERO if w is None else w[int(np.argmax(first))]
             return Slopes(lifted, zero, zero, by_load + jump)
         moved = zero  # lambda - weight q
         if w is not None or v is not None:
@@ -115,18 +110,6 @@ class Part:
         lifted = moved if v is None else moved + v
         local = (own * 3.0 / 5.0 - moved) * level.indentation.positive_part()
         return Slopes(lifted - own, local, own * 0.5 - lifted, by_load)
-
-
-def _first_touch(level: Level, weight: Ball, w: Ball | None) -> tuple[Ball, Ball]:
-    """Coefficients of dd and dL at the load 0, where D0 is -d_i of the first asperity to touch."""
-    offsets = level.problem.exact.offsets
-    first = offsets.upper >= offsets.lower.max()
-    if np.count_nonzero(first) > 1:
-        expected = "a force below f P, as several asperities slide last, at the same force"
-        raise InputError("force", found="gross sliding", expected=expected)
-    zero = Ball.exact(np.zeros(len(offsets)))
-    moved = where(first, zero - weight, zero)
-    return moved, ZERO if w is None else w[int(np.argmax(first))]
 
 
 def product(level: Level, weights: Ball) -> Ball:

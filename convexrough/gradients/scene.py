@@ -22,8 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from convexrough.arithmetic.balls import Ball, joined, of_rows, where
-from convexrough.arrays import Indices
-from convexrough.influence import Influence
+from convexrough.arrays import Array, Indices
 from convexrough.normal.problem import NormalProblem
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.base import along
@@ -45,55 +44,39 @@ class Bending(NamedTuple):
 
 @dataclass(frozen=True)
 class Geometry:
-    """The geometry of n asperities, in the scene's units, as balls.
-
-    points, contact_points : (n, 2) r and c
-    tips      : (n,) rho
-    curvature : (2,) 1/R along x and y
-    bend      : (n, 2) b
-    share     : (n, 2) c / r
-    relative  : (n,) 1 / (1/R + 1/rho)
-    """
+    """The geometry of n asperities, in the scene's units, as balls."""
 
     problem: NormalProblem
-    points: Ball
-    tips: Ball
-    curvature: Ball
+    points: Ball  # (n, 2) r
+    tips: Ball  # (n,) rho
+    curvature: Ball  # (2,) 1/R along x and y
+    share: Ball  # (n, 2) c / r
 
     @classmethod
     def of(cls, problem: NormalProblem, which: Indices) -> Geometry:
         """The geometry of the asperities `which` of the scene."""
-        asperities = problem.scene.asperities
-        radii = np.array(along(problem.scene.sphere_radius))
+        asperities, radii = problem.scene.asperities, np.array(along(problem.scene.sphere_radius))
+        r, rho = asperities.positions[which], Ball.exact(asperities.tip_radii[which])
         bent = np.isfinite(radii)
-        flat = Ball.exact(np.zeros(2))
-        return cls(
-            problem,
-            Ball.exact(asperities.positions[which]),
-            Ball.exact(asperities.tip_radii[which]),
-            where(bent, 1.0 / Ball.exact(np.where(bent, radii, 1.0)), flat),
-        )
+        inverse = 1.0 / Ball.exact(np.where(bent, radii, 1.0))
+        curvature = where(bent, inverse, Ball.exact(np.zeros(2)))
+        share = Ball.exact(np.ones(r.shape))
+        if problem.scene.geometry == "closest":
+            share = 1.0 / (1.0 + rho[:, None] * curvature)
+        return cls(problem, Ball.exact(r), rho, curvature, share)
 
     @property
     def closest(self) -> bool:
         return self.problem.scene.geometry == "closest"
 
     @cached_property
-    def share(self) -> Ball:
-        if not self.closest:
-            return 1.0 + 0.0 * self.points
-        return 1.0 / (1.0 + self.tips[:, None] * self.curvature)
-
-    @cached_property
     def bend(self) -> Ball:
+        """(n, 2) b."""
         return self.share * self.curvature
 
     @cached_property
-    def contact_points(self) -> Ball:
-        return self.points * self.share if self.closest else self.points
-
-    @cached_property
     def relative(self) -> Ball:
+        """(n,) 1 / (1/R + 1/rho)."""
         return 1.0 / (self.curvature.sum() * 0.5 + 1.0 / self.tips)
 
     @cached_property
@@ -124,27 +107,25 @@ class Geometry:
     def slopes(self, loads: Sequence[Ball], which: Indices) -> list[Ball]:
         """(m, 2) for each vector P, the sums  -scale sum_j (c_i - c_j) P_j / |c_i - c_j|^3.
 
-        scale is 1 / (pi E*), in scaled units.
-
-        loads : vectors P, (m,) each, of the asperities `which`. For more than IN_BALLS asperities
-            the sums are computed in float64, and the error bounds are infinite if no compliance
-            matrix is stored
+        scale is 1 / (pi E*) in scaled units. The P are loads (m,) of the asperities `which`. For
+        more than IN_BALLS asperities the sums are computed in float64, and the error bounds are
+        infinite if no compliance matrix is stored.
         """
         if len(which) <= IN_BALLS:
             return self._in_balls(loads, which)
-        influence = self.problem.influence.restricted(which)
-        return [self._at_once(each, influence) for each in loads]
-
-    def _at_once(self, loads: Ball, influence: Influence) -> Ball:
-        found = influence.slopes(loads.value)
-        if influence.name != "dense":
-            return Ball.around(found, np.inf)
-        off = (len(loads) + 16) * ROUNDOFF + 4.0 * influence.entry_error
-        size = influence.falloff(np.abs(loads.value) * off + loads.error, 2) * influence.scale
-        return Ball.around(found, (size * (1 + SAFETY))[:, None])
+        A, found = self.problem.influence.restricted(which), []
+        for P in loads:
+            size: Array | float = np.inf
+            if A.name == "dense":
+                off = (len(which) + 16) * ROUNDOFF + 4.0 * A.entry_error
+                size = A.falloff(np.abs(P.value) * off + P.error, 2) * A.scale * (1 + SAFETY)
+                size = size[:, None]
+            found.append(Ball.around(A.slopes(P.value), size))
+        return found
 
     def _in_balls(self, loads: Sequence[Ball], which: Indices) -> list[Ball]:
-        points, scale, n = self.contact_points[which], self.problem.exact.scale, len(which)
+        points = (self.points * self.share if self.closest else self.points)[which]  # c
+        scale, n = self.problem.exact.scale, len(which)
         found: list[list[Ball]] = [[] for _ in loads]
         rows = max(1, BLOCK // max(1, n))
         for start in range(0, n, rows):
