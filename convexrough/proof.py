@@ -209,16 +209,12 @@ def _written(value: Any) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class TrialState:
-    """Contact radii (n,) [length] near a solution.
-
-    largest  : (n,) [length] the largest contact radii in this and in all friction states
-    approach : [length] the prescribed approach, or None
-    """
+    """Contact radii (n,) [length] near a solution."""
 
     scene: Scene
     radii: Array
-    largest: Array
-    approach: float | None
+    largest: Array  # (n,) [length] the largest in this and in all friction states
+    approach: float | None  # [length] the prescribed approach, or None
 
     @cached_property
     def apart(self) -> Array:

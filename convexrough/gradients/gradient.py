@@ -36,22 +36,14 @@ WHOLE = ("friction", "load", "approach", "force", "maximum", "minimum")
 
 @dataclass(frozen=True)
 class Number:
-    """A number J that depends on a contact, with its derivatives at constant forces and load.
+    """A number J that depends on a contact, with its derivatives at constant forces and load."""
 
-    top    : the level of the contact; its problem has n asperities that could touch (candidates)
-    value  : J
-    parts  : the parts of J that come from levels
-    slopes : derivatives of J by parameters at constant offsets d, coefficients k and matrix A
-    steep  : for each of these derivatives that is infinite, a number of the same sign
-    sides  : for "forces" or "loads" of a path, (m, 2) derivatives from below and from above
-    """
-
-    top: Level
-    value: Ball
-    parts: Sequence[Part]
-    slopes: Moves
-    steep: Mapping[str, float]
-    sides: Mapping[str, Array]
+    top: Level  # of the contact; n asperities could touch (candidates)
+    value: Ball  # J
+    parts: Sequence[Part]  # of J that come from levels
+    slopes: Moves  # derivatives of J at constant offsets d, coefficients k and matrix A
+    steep: Mapping[str, float]  # for infinite ones of them, numbers of the same sign
+    sides: Mapping[str, Array]  # for "forces" or "loads" of a path: (m, 2) from below and above
 
     @classmethod
     def of(
@@ -81,10 +73,7 @@ class Number:
         return replace(self, value=self.value * factor, parts=parts, slopes=both)
 
     def holding_the_approach(self) -> Number:
-        """The number with derivatives at constant approach: dJ|D0 = dJ|P - (dJ/dP / S) dD0|P.
-
-        The bar names what is constant: the approach D0 or the load P. S is dD0/dP.
-        """
+        """The number with derivatives at constant approach: dJ|D0 = dJ|P - (dJ/dP / S) dD0|P."""
         slopes, units = dict(self.slopes), self.top.problem.units
         by_approach = slopes.pop("load", ZERO) * units.force / self.top.tangent.approach
         slopes["approach"] = by_approach / units.length
@@ -132,9 +121,8 @@ class Number:
     @cached_property
     def positions(self) -> Ball:
         """(n, 2) derivatives by the positions of the summits."""
-        geometry = self.geometry
-        sinking = self.offsets[:, None] * geometry.bend * geometry.points
-        return self.turning * geometry.share - sinking
+        sinking = self.offsets[:, None] * self.geometry.bend * self.geometry.points
+        return self.turning * self.geometry.share - sinking
 
     def along(self, by: Bending) -> Ball:
         """(n,) for each asperity, the derivative along the change `by` of its geometry."""
@@ -156,21 +144,13 @@ class Number:
 
     @property
     def balance_defect(self) -> float:
-        """Relative error in the identity  E* dJ/dE* + sum of L dJ/dL = the terms of J with V and P.
-
-        If the modulus and all loads are multiplied by one factor, so are these terms
-        (`Part.scaled`).
-        """
+        """Relative error in the identity  E* dJ/dE* + sum of L dJ/dL = sum of `Part.scaled`."""
         bent = self.local.sum() * -2.0 / 3.0
         terms = [bent, -self.coupled, *(part.slopes.load * part.level.load for part in self.parts)]
         terms += [-sum((part.scaled for part in self.parts), start=ZERO)]
         defect = float(sum(terms, start=ZERO).value)
         size = max(float(np.abs(term.value)) for term in terms)
         return abs(defect) / size if size > 0 else 0.0
-
-    def in_scene(self, values: Array) -> Array:
-        """(N, ...) the values (n, ...) of the candidates, with 0 for all other asperities."""
-        return frozen(self.top.problem.to_scene(values))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -273,29 +253,25 @@ class Gradient(Table, Plottable):
             found[name] = frozen(slopes.value.copy())
             found[f"{one}_errors"] = frozen(slopes.error.copy())
             found[f"{one}_sides"] = frozen(sides)
-        tips = shown.along(shown.geometry.by_tip)
-        return cls(
-            contact=contact,
-            holding=holding,
-            heights=shown.in_scene(shown.offsets.value),
-            height_errors=shown.in_scene(shown.offsets.error),
-            tip_radii=shown.in_scene(tips.value),
-            tip_radius_errors=shown.in_scene(tips.error),
-            balance_defect=shown.balance_defect,
-            number=number,
-            shown=shown,
-            **found,
-        )
+        to_scene = shown.top.problem.to_scene
+        for name, one, each in (
+            ("heights", "height", shown.offsets),
+            ("tip_radii", "tip_radius", shown.along(shown.geometry.by_tip)),
+        ):
+            found[name] = frozen(to_scene(each.value))
+            found[f"{one}_errors"] = frozen(to_scene(each.error))
+        defect = shown.balance_defect
+        return cls(contact, holding, balance_defect=defect, number=number, shown=shown, **found)
 
     @cached_property
     def positions(self) -> Array:
         """(n, 2) derivatives by x and y, with zeros as in `heights`."""
-        return self.shown.in_scene(self.shown.positions.value)
+        return frozen(self.shown.top.problem.to_scene(self.shown.positions.value))
 
     @cached_property
     def position_errors(self) -> Array:
         """(n, 2) proved bounds on the errors of `positions`."""
-        return self.shown.in_scene(self.shown.positions.error)
+        return frozen(self.shown.top.problem.to_scene(self.shown.positions.error))
 
     @cached_property
     def normalised(self) -> Gradient:
