@@ -19,9 +19,8 @@ from convexrough.contact import Contact, turned
 from convexrough.errors import InputError
 from convexrough.friction.shear import ShearState
 from convexrough.gradients.gradient import control_held, levels
-from convexrough.gradients.parts import ZERO, Part, product
+from convexrough.gradients.parts import ZERO, Bending, Geometry, Part, product
 from convexrough.gradients.results import by_ratio, level_below, with_friction
-from convexrough.gradients.scene import Bending, Geometry
 from convexrough.influence.choice import couple
 from convexrough.normal.level import Level, Response
 from convexrough.record import Along, Record, Table

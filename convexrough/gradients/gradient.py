@@ -19,8 +19,7 @@ from convexrough.arithmetic.balls import Ball, of_rows
 from convexrough.arrays import Array, among_zeros, frozen
 from convexrough.contact import Contact, levels_of
 from convexrough.errors import InputError
-from convexrough.gradients.parts import ZERO, Moves, Part
-from convexrough.gradients.scene import Bending, Geometry
+from convexrough.gradients.parts import ZERO, Bending, Geometry, Moves, Part
 from convexrough.normal.level import Level
 from convexrough.normal.levels import Levels
 from convexrough.plottable import Plottable

@@ -93,12 +93,14 @@ def contact_gradient(
     holding = control_held(contact, holding)
     top, (on_loads, on_gaps, D, P) = levels(contact).top, _checked(contact, weights)
     on_loads, units = on_loads + P, top.problem.units
-    which = np.union1d(top.problem.candidates, np.flatnonzero(on_gaps))
-    if len(which) > len(top.problem):  # the new candidates are open
+    far = np.setdiff1d(np.flatnonzero(on_gaps), top.problem.candidates)
+    if len(far):  # they become candidates, which are open
         assert top.trial is not None
+        which = np.union1d(top.problem.candidates, far)
         places, known = np.searchsorted(which, top.problem.candidates), top.trial.loads.high
         wider = top.problem.widened(which)
         top = proved(wider, refined_loads(wider, among_zeros(known, places, len(which))))
+    which = top.problem.candidates
     part = Part(
         top,
         approach=Ball.exact(D) * units.length,
