@@ -13,9 +13,9 @@ of the asperity: its height minus the distance there between the base and the pl
 base on the axis. Below, A_ij = 1 / (pi E* r_ij) and A_ii = 0.
 
 A proof file contains a scene, radii near its solution, a box of radii, an argument that the energy
-is convex on this box, and claims. Its numbers are float64 in hexadecimal, which are exact
-rationals. The checker computes with rationals and with intervals between rationals. Equation (1) is
-in docs/theory/proof-file.md; (2) to (12) are in proof-file-steps.md in the same folder.
+is convex on this box, and claims. Its numbers are float64 in hexadecimal. The checker computes with
+rationals and with intervals between rationals. Equation (1) is in docs/theory/proof-file.md; (2) to
+(12) are in proof-file-steps.md in the same folder.
 
 Exit status: 0 if all claims are proved; 1 if a claim is refused, with the reason; 2 if the file is
 not a proof.
@@ -25,9 +25,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+import logging
 import math
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from fractions import Fraction
 from operator import le, mul
@@ -47,7 +48,7 @@ ROOT_BITS = 60  # bits of the integer Cholesky factor
 ONE_BITS = 80  # binary places of fixed-point numbers in the proof of order
 ONE = 1 << ONE_BITS
 
-Tell = Callable[[str], object]
+LOGGER = logging.getLogger("convexrough")  # of progress
 
 
 class Refused(Exception):
@@ -56,9 +57,6 @@ class Refused(Exception):
 
 class Unreadable(Exception):
     """The file is not a proof."""
-
-
-# Numbers ------------------------------------------------------------------------------------------
 
 
 def rounded(x: Fraction | int, up: bool) -> Fraction:
@@ -107,6 +105,9 @@ class Interval:
     def positive_part(self) -> Interval:
         return Interval(max(self.low, Fraction(0)), max(self.high, Fraction(0)))
 
+    def negative_part(self) -> Interval:
+        return (self * -1).positive_part()
+
     def root(self) -> Interval:
         """The square root of a number that is not negative."""
         return Interval(root(self.low, up=False), root(self.high, up=True))
@@ -123,14 +124,7 @@ def interval(x: Interval | Fraction | int) -> Interval:
     return x if isinstance(x, Interval) else Interval(x)
 
 
-def added_up(values: Sequence[Interval]) -> Interval:
-    return sum(values, Interval(0))
-
-
 PI = Interval(*(Fraction(31415926535897932384626433832795028841971 + i, 10**40) for i in (0, 1)))
-
-
-# Reading ------------------------------------------------------------------------------------------
 
 
 def read(path: str) -> Any:
@@ -162,8 +156,8 @@ def read(path: str) -> Any:
 def table(value: Any, *keys: str) -> list[Any]:
     """The values of the given keys. Other keys are refused, as they would not be checked."""
     if not isinstance(value, dict) or set(value) != set(keys):
-        names = ", ".join(value) or "none of them" if isinstance(value, dict) else ""
-        found = names or type(value).__name__
+        kind = type(value).__name__
+        found = ", ".join(value) or "none of them" if isinstance(value, dict) else kind
         raise Unreadable(f"expected a table of {', '.join(keys)}, found {found[:200]}")
     return [value[key] for key in keys]
 
@@ -187,11 +181,6 @@ def number(text: Any, what: str) -> Fraction:
 
 def numbers(values: Any, what: str, n: int | None = None) -> list[Fraction]:
     return [number(text, f"{what} [{i}]") for i, text in enumerate(as_list(values, what, n))]
-
-
-def added(texts: Any, what: str) -> Fraction:
-    """The exact sum of float64 numbers, which together stand for one number with more digits."""
-    return sum(numbers(texts, what), Fraction(0))
 
 
 def digest(scene: Any, prescribed: Any) -> str:
@@ -252,11 +241,8 @@ def read_scene(given: Any) -> Scene:
     return Scene(modulus, ratio, friction, radii, offsets, points, grid)
 
 
-# Convexity ----------------------------------------------------------------------------------------
-
-
 def distances(
-    scene: Scene, some: Sequence[int], chosen: list[int], tell: Tell
+    scene: Scene, some: Sequence[int], chosen: list[int]
 ) -> Iterator[tuple[int, list[int]]]:
     """Yields, for each i of `some`, i and the integers m of (1), one for each j of `chosen`."""
     place = {j: k for k, j in enumerate(chosen)}
@@ -269,7 +255,7 @@ def distances(
         if min(apart, default=FAR) < NEAREST:
             raise Refused(f"asperity {i} is too near another to bound their distance")
         if i % 100 == 0:
-            tell(f"asperity {i} of {len(scene.points)}")
+            LOGGER.info("asperity %d of %d", i, len(scene.points))
         yield i, apart
 
 
@@ -281,7 +267,7 @@ class Box(NamedTuple):
     theta: Fraction
 
 
-def read_box(scene: Scene, given: Sequence[Any], tell: Tell) -> Box:
+def read_box(scene: Scene, given: Sequence[Any]) -> Box:
     """The box. Proves that A + diag(theta / (2 E* b)) is positive semidefinite (2)."""
     b, theta = numbers(given[0], "box", len(scene.points)), number(given[1], "convexity_number")
     able = [i for i in range(len(b)) if b[i] > 0]
@@ -289,20 +275,20 @@ def read_box(scene: Scene, given: Sequence[Any], tell: Tell) -> Box:
         raise Refused("the box is negative, or the convexity number not between 0 and 1")
     radii = [b[i] / theta for i in able]
     if given[2] is None:
-        prove_definite(scene, radii, able, tell)
+        prove_definite(scene, radii, able)
     else:
-        prove_by_shells(scene, numbers(given[2], "shells", len(b)), radii, able, tell)
+        prove_by_shells(scene, numbers(given[2], "shells", len(b)), radii, able)
     return Box(b, able, theta)
 
 
 def prove_by_shells(
-    scene: Scene, shells: list[Fraction], radii: list[Fraction], able: list[int], tell: Tell
+    scene: Scene, shells: list[Fraction], radii: list[Fraction], able: list[int]
 ) -> None:
     """Prove A + diag(1 / (2 E* radii)) >= 0 by spherical shells (3), which may overlap."""
     sizes = [math.floor(shells[i] * scene.grid) for i in able]
     if min(sizes, default=1) <= 0:
         raise Refused("a shell is not positive")
-    rows = distances(scene, able, able, tell)
+    rows = distances(scene, able, able)
     for size, radius, (i, apart) in zip(sizes, radii, rows, strict=True):
         overlap = 0
         for other, m in zip(sizes, apart, strict=True):
@@ -312,12 +298,12 @@ def prove_by_shells(
             raise Refused(f"the shell of asperity {i} is too small, or overlaps others too much")
 
 
-def prove_definite(scene: Scene, radii: list[Fraction], able: list[int], tell: Tell) -> None:
+def prove_definite(scene: Scene, radii: list[Fraction], able: list[int]) -> None:
     """Prove A + diag(1 / (2 E* radii)) >= 0 by a Cholesky factorisation in integers (4)."""
     scale = [math.isqrt(math.floor(2 * c * scene.grid * 4**ROOT_BITS)) for c in radii]
     wholes, parts = (PI.high * UNIT).as_integer_ratio()
     factor: list[list[int]] = []
-    for k, (_, apart) in enumerate(distances(scene, able, able, tell)):
+    for k, (_, apart) in enumerate(distances(scene, able, able)):
         row = list[int]()
         for j in range(k):
             entry = scale[k] * scale[j] * (UNIT // (apart[j] + 3)) * parts // wholes
@@ -326,9 +312,6 @@ def prove_definite(scene: Scene, radii: list[Fraction], able: list[int], tell: T
         if (rest := rest - (4 * len(able) << ROOT_BITS)) <= 0:
             raise Refused("the energy is not proved convex: its Cholesky factorisation breaks down")
         factor.append([*row, math.isqrt(rest)])
-
-
-# The solution -------------------------------------------------------------------------------------
 
 
 class State(NamedTuple):
@@ -343,30 +326,31 @@ class State(NamedTuple):
     energy: Interval  # the energy of the solution, the least for this total (9)
 
 
-def prove_state(scene: Scene, box: Box, place: Any, load: Interval | None, tell: Tell) -> State:
+def prove_state(scene: Scene, box: Box, place: Any, load: Interval | None) -> State:
     """The solution, proved to be in the box, at the total `load` or, if None, the given approach.
 
-    place : the entry of the file with radii and approach
+    place : the entry of the file with radii and approach; each is a sum of float64 numbers
     """
     radii, centre = table(place, "radii", "approach")
-    n = len(scene.points)
-    a = [added(radius, f"radii [{i}]") for i, radius in enumerate(as_list(radii, "radii", n))]
-    approach, b, R, d = added(centre, "approach"), box.radii, scene.radii, scene.offsets
-    everyone = range(len(a))
+    b, R, d, everyone = box.radii, scene.radii, scene.offsets, range(len(scene.points))
+    sums = [numbers(x, f"radii [{i}]") for i, x in enumerate(as_list(radii, "radii", len(b)))]
+    a = [sum(parts, Fraction(0)) for parts in sums]
+    approach = sum(numbers(centre, "approach"), Fraction(0))
     if min(a) < 0 or any(a[i] > b[i] for i in everyone):
         raise Refused("a contact radius is negative, or outside the box")
     exact = [4 * a[i] ** 3 / (3 * R[i]) for i in everyone]
-    pushed, spread = push(scene, box, exact, tell)
+    pushed, spread = push(scene, box, exact)
     near, local = [Interval(p) for p in exact], [Interval(a[i] ** 2 / R[i]) for i in everyone]
     if load is not None:  # (5) scaled to the total
-        scaling = Interval(1).wider((load / added_up(near) - 1).size())
+        scaling = Interval(1).wider((load / sum(near, Interval(0)) - 1).size())
         near, local, pushed = ([x * scaling for x in xs] for xs in (near, local, pushed))
 
     # (6) Bound the distance to the solution in the energy norm, (7) in each load; check the box.
     trial = [d[i] + approach - pushed[i] for i in everyone]
     gaps = [local[i] - trial[i] for i in everyone]
     off = [gaps[i].size() if a[i] > 0 else max(-gaps[i].low, Fraction(0)) for i in everyone]
-    misfit = added_up([Interval(off[i]) * off[i] * (2 * b[i]) for i in box.able]).root()
+    squares = [Interval(off[i]) * off[i] * (2 * b[i]) for i in box.able]
+    misfit = sum(squares, Interval(0)).root()
     distance = misfit / (1 - box.theta)
     error = [(distance * interval(2 * radius).root()).high for radius in b]
     if any(near[i].high + error[i] >= 4 * b[i] ** 3 / (3 * R[i]) for i in box.able):
@@ -394,23 +378,21 @@ def prove_state(scene: Scene, box: Box, place: Any, load: Interval | None, tell:
 
     # (9) The energy of the solution is at most distance * misfit below that of the trial loads.
     mean = [local[i] * Fraction(3, 5) + pushed[i] * Fraction(1, 2) - d[i] for i in everyone]
-    energy = added_up([near[i] * mean[i] for i in everyone if a[i] > 0])
+    energy = sum([near[i] * mean[i] for i in everyone if a[i] > 0], Interval(0))
     energy += Interval(-(distance * misfit).high, 0)
     if load is None:
-        load = added_up(loads)
-        energy += (load - added_up(near)) * approach
+        load = sum(loads, Interval(0))
+        energy += (load - sum(near, Interval(0))) * approach
     return State(near, pushed, D0, depths, loads, load, energy)
 
 
-def push(
-    scene: Scene, box: Box, loads: list[Fraction], tell: Tell
-) -> tuple[list[Interval], list[Interval]]:
+def push(scene: Scene, box: Box, loads: list[Fraction]) -> tuple[list[Interval], list[Interval]]:
     """Intervals for (A P)_i, P = `loads`, and for sum_j A_ij^2 2 b_j, from sums of integers (1)."""
     force = max(loads) / 2**GRID or Fraction(1)
     parts = [math.floor(loads[j] / force) for j in box.able]
     weights = [math.ceil(2 * box.radii[j] * scene.grid) for j in box.able]
     pushed, spread = [], []
-    for _, apart in distances(scene, range(len(scene.points)), box.able, tell):
+    for _, apart in distances(scene, range(len(scene.points)), box.able):
         inverse = [UNIT // (m + 3) for m in apart]
         least = sum(map(mul, inverse, parts))
         most = (least + sum(inverse)) * SLACK
@@ -439,10 +421,7 @@ def scope(scene: Scene, box: Box, state: State, top: Fraction | None) -> str:
     return "global" if all(map(le, squares, (b * b for b in box.radii))) else "local"
 
 
-# Friction -----------------------------------------------------------------------------------------
-
-
-def ordered_fall(scene: Scene, box: Box, state: State, tell: Tell) -> Fraction:
+def ordered_fall(scene: Scene, box: Box, state: State) -> Fraction:
     """A decrease of D0 from this state over which order is proved (11); 0 if none is.
 
     The rate of an asperity is the derivative of its indentation with respect to D0. `missed` holds
@@ -456,7 +435,7 @@ def ordered_fall(scene: Scene, box: Box, state: State, tell: Tell) -> Fraction:
     rows: dict[int, list[int]] = {}  # rows of F (11) times ONE, too small by less than `rounding`
     sums: dict[int, int] = {}
     able = [i for i, d in enumerate(scene.offsets) if (state.approach + d).high > 0]
-    for i, apart in distances(scene, able, near, tell):
+    for i, apart in distances(scene, able, near):
         row = [w * parts // ((m + 3) * wholes) for w, m in zip(weights, apart, strict=True)]
         sums[i] = sum(row)
         if len(near) <= MOST_INVERTED:
@@ -464,7 +443,7 @@ def ordered_fall(scene: Scene, box: Box, state: State, tell: Tell) -> Fraction:
     rounding = 2 + (max(sums.values(), default=0) >> 68)
     missed = {i: Fraction(each + rounding * len(near) - ONE) for i, each in sums.items()}
     if any(missed[i] > 0 for i in near):
-        missed = missed_by_inverse(rows, near, rounding, tell) if rows else {near[0]: Fraction(1)}
+        missed = missed_by_inverse(rows, near, rounding) if rows else {near[0]: Fraction(1)}
     if any(missed[i] >= 0 for i in near):
         return Fraction(0)
     falls = [-state.depths[i].high * ONE / each for i, each in missed.items() if each > 0]
@@ -472,7 +451,7 @@ def ordered_fall(scene: Scene, box: Box, state: State, tell: Tell) -> Fraction:
 
 
 def missed_by_inverse(
-    rows: dict[int, list[int]], near: list[int], rounding: int, tell: Tell
+    rows: dict[int, list[int]], near: list[int], rounding: int
 ) -> dict[int, Fraction]:
     """`missed` of `ordered_fall`, by the bounds (11) with weights from an approximate inverse."""
     n, place = len(near), {i: k for k, i in enumerate(near)}
@@ -480,16 +459,13 @@ def missed_by_inverse(
     for k in range(n):  # Gauss-Jordan elimination in place
         if X[k][k] <= 0:
             return dict.fromkeys(rows, Fraction(1))
-        tell(f"inverting: {k} of {n}")
-        top = [ONE * x // X[k][k] for x in X[k]]
-        top[k] = ONE * ONE // X[k][k]
+        LOGGER.info("inverting: %d of %d", k, n)
+        pivot, X[k][k] = X[k][k], ONE
+        X[k] = [ONE * x // pivot for x in X[k]]
         for i in range(n):
-            factor = X[i][k]
-            X[i][k] = 0
             if i != k:
-                pairs = zip(X[i], top, strict=True)
-                X[i] = [x - (factor * t >> ONE_BITS) for x, t in pairs]
-        X[k] = top
+                factor, X[i][k] = X[i][k], 0
+                X[i] = [x - (factor * t >> ONE_BITS) for x, t in zip(X[i], X[k], strict=True)]
     inverse = list(zip(*X, strict=True))
     columns, found = list(zip(*(rows[i] for i in near), strict=True)), {}
     for i, row in rows.items():
@@ -508,7 +484,7 @@ def missed_by_inverse(
 
 
 def prove_shear(
-    scene: Scene, box: Box, pressed: State, ordered: Fraction, entry: Any, tell: Tell
+    scene: Scene, box: Box, pressed: State, ordered: Fraction, entry: Any
 ) -> dict[str, Any]:
     """What is proved about a friction state, which is a difference of two solutions (12)."""
     force, place = table(entry, "force", "held")
@@ -518,14 +494,14 @@ def prove_shear(
     fall = number(force, "force") / unit
     if (pressed.total - fall).low <= 0:
         raise Refused("a shear force is not proved to be below the friction limit")
-    held = prove_state(scene, box, place, pressed.total - fall, tell)
+    held = prove_state(scene, box, place, pressed.total - fall)
     drop, mean = pressed.approach - held.approach, pressed.approach + held.approach
     in_order, travel = drop.high < ordered, f * (2 - scene.ratio) / (2 * (1 - scene.ratio))
     statuses, slips = list[str](), list[Interval]()
     for i, (at, after) in enumerate(zip(pressed.depths, held.depths, strict=True)):
         if not in_order and after.high > 0 and held.loads[i].high > pressed.loads[i].low:
             raise Refused(f"asperity {i} may be dragged along: under less load it may carry more")
-        touches, slip = status(at, "contact", "open"), gap_of(after) * travel
+        touches, slip = status(at, "contact", "open"), after.negative_part() * travel
         statuses.append(status(after, "partial", "sliding") if touches == "contact" else touches)
         slips.append(Interval(slip.low if at.low > 0 else 0, slip.high if at.high > 0 else 0))
     excess = pressed.energy - held.energy - mean * (fall / 2)
@@ -539,13 +515,11 @@ def prove_shear(
     }
 
 
-# Claims -------------------------------------------------------------------------------------------
-
 KEYS = ("format", "scene", "prescribed", "sha256", "argument", "pressed", "sheared", "claims")
 WEAKER = {"global": "local", "local": "local", "proved": "proved for one step"}
 
 
-def prove(document: Any, tell: Tell) -> dict[str, Any]:
+def prove(document: Any) -> dict[str, Any]:
     """All that is proved: statuses, and intervals for loads, gaps, forces, slips and losses."""
     form, given, prescribed, named, argument, pressed, sheared, _ = table(document, *KEYS)
     if form != FORMAT:
@@ -561,22 +535,18 @@ def prove(document: Any, tell: Tell) -> dict[str, Any]:
         raise Refused("the approach is not the one prescribed")
     elif ceiling is not None:
         raise Unreadable("the ceiling must be null if the approach is prescribed")
-    box = read_box(scene, convexity, tell)
-    state = prove_state(scene, box, pressed, load, tell)
-    ordered = ordered_fall(scene, box, state, tell) if as_list(sheared, "sheared") else Fraction(0)
+    box = read_box(scene, convexity)
+    state = prove_state(scene, box, pressed, load)
+    ordered = ordered_fall(scene, box, state) if as_list(sheared, "sheared") else Fraction(0)
     return {
         "scope": scope(scene, box, state, top),
         "approach": state.approach,
         "load": state.total * scene.modulus,
         "status": [status(depth, "contact", "open") for depth in state.depths],
         "loads": [load * scene.modulus for load in state.loads],
-        "gaps": [gap_of(depth) for depth in state.depths],
-        "shear": [prove_shear(scene, box, state, ordered, entry, tell) for entry in sheared],
+        "gaps": [depth.negative_part() for depth in state.depths],
+        "shear": [prove_shear(scene, box, state, ordered, entry) for entry in sheared],
     }
-
-
-def gap_of(depth: Interval) -> Interval:
-    return (depth * -1).positive_part()
 
 
 def status(depth: Interval, positive: str, negative: str) -> str:
@@ -604,6 +574,10 @@ def hold(what: str, claimed: Any, proved: Any) -> None:
 def sentence(document: Any) -> str:
     """The claims in sentences: one about the contact, and one for each shear force."""
     claims, ((control, value),) = document["claims"], document["prescribed"].items()
+
+    def counts(some: Any, *statuses: str) -> str:
+        return ", ".join(f"{some['status'].count(it)} {it}" for it in (*statuses, "undecided"))
+
     bounds = [numbers(pair, "claims loads", 2) for pair in claims["loads"]]
     largest = max(high for _, high in bounds) or Fraction(1)
     widest = min(max(high - low for low, high in bounds) / largest, Fraction(1))
@@ -611,7 +585,7 @@ def sentence(document: Any) -> str:
     alone = "the only one" if claims["scope"] == "global" else "the only one inside its box"
     lines = [
         f"proved: under the {control} {float.fromhex(value):.10g} there is a solution, {alone}",
-        f"{counted(claims, 'contact', 'open')}, loads known to {known:g} of the largest",
+        f"{counts(claims, 'contact', 'open')}, loads known to {known:g} of the largest",
     ]
     for entry, claim in zip(document["sheared"], claims["shear"], strict=True):
         lost = "no loss is proved"
@@ -620,33 +594,28 @@ def sentence(document: Any) -> str:
             down, up = (Context(10, rounding) for rounding in (ROUND_FLOOR, ROUND_CEILING))
             lost = f"a cycle loses {down.create_decimal(low):g} to {up.create_decimal(high):g}"
         force = f"under the shear force {float.fromhex(entry['force']):.10g}"
-        counts = counted(claim, "sliding", "partial")
-        lines.append(f"{force} ({claim['order']}): {counts}, {lost}")
+        lines.append(f"{force} ({claim['order']}): {counts(claim, 'sliding', 'partial')}, {lost}")
     return "\n  ".join([*lines, f"scene {document['sha256'][:12]}"])
 
 
-def counted(claims: Any, *statuses: str) -> str:
-    every = (*statuses, "undecided")
-    return ", ".join(f"{claims['status'].count(status)} {status}" for status in every)
-
-
-def check(document: Any, tell: Tell) -> str:
+def check(document: Any) -> str:
     """The claims in sentences. Raises Refused if one is not proved, Unreadable for other files."""
-    proved = prove(document, tell)
+    proved = prove(document)  # also proves that the document has the keys
     hold("claims", document["claims"], proved)
     return sentence(document)
 
 
 def main(arguments: Sequence[str]) -> int:
-    def tell(line: str) -> None:
-        if sys.stderr.isatty():
-            print(f"\r{line}\033[K", end="\r", file=sys.stderr, flush=True)
-
+    if sys.stderr.isatty():  # then a line shows the progress
+        progress = logging.StreamHandler()
+        progress.terminator = "\033[K\r"
+        LOGGER.addHandler(progress)
+        LOGGER.setLevel(logging.INFO)
     if len(arguments) != 1 or arguments[0].startswith("-"):
         print("usage: python checker.py proof.json", file=sys.stderr)
         return 2
     try:
-        print(check(read(arguments[0]), tell))
+        print(check(read(arguments[0])))
         return 0
     except Refused as error:
         print(f"refused: {error}", file=sys.stderr)

@@ -25,13 +25,12 @@ from convexrough import checks, solvers
 from convexrough.arrays import Array
 from convexrough.contact import Contact, press
 from convexrough.errors import InputError, SolverError
-from convexrough.frames import Variables
 from convexrough.influence import Kind
 from convexrough.memory import MemoryRise
 from convexrough.normal.certificate import Certificate
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER, logged_steps
-from convexrough.record import LINE, Record, Table, in_text
+from convexrough.record import LINE, Record, Table, Variables, in_text
 from convexrough.scene.asperities import Asperities
 from convexrough.scene.material import Material
 from convexrough.scene.scene import Scene
@@ -173,10 +172,13 @@ def compare(
     """
     others = every_solver() if solvers is None else [*map(named, solvers)]
     pressed = partial(press, scene, approach=approach, load=load, influence=influence)
+    two = Asperities([[0.0, 0.0], [1.0, 0.0]], tip_radii=1.0)
+    small = Scene(1e3, two, Material(contact_modulus=1.0, poisson_ratio=0.3))
     entries: list[Entry] = []
     for solver in (_REFERENCE, *(each for each in others if each != _REFERENCE)):
         LOGGER.info(solver.name)
-        _load_code_of(solver)
+        with suppress(Exception, SystemExit):  # imports by the solver are not timed
+            press(small, approach=1e-2, solver=solver)
         kept: AbstractContextManager[Sequence[Any]] = logged_steps() if log else nullcontext(())
         with kept as steps:
             entry = _enter(solver, pressed)
@@ -185,17 +187,18 @@ def compare(
         name = next(each for each in numbered if each not in taken)
         entry = replace(_against(entry, [*entries, entry][0]), solver=name, steps=tuple(steps))
         entries.append(entry)
-    answers = ((each.solver, each.contact) for each in entries if each.contact is not None)
-    pairs = combinations([Answer(name, it.loads, it.certificate) for name, it in answers], 2)
-    return Comparison(
-        entries=tuple(entries),
-        contradictions=tuple(
-            found
-            for pair in pairs
-            if any(answer.certificate.scope == "global" for answer in pair)
-            for found in contradictions(*pair)
-        ),
+    answers = [
+        Answer(each.solver, each.contact.loads, each.contact.certificate)
+        for each in entries
+        if each.contact is not None
+    ]
+    contradicting = tuple(
+        sentence
+        for pair in combinations(answers, 2)
+        if any(answer.certificate.scope == "global" for answer in pair)
+        for sentence in contradictions(*pair)
     )
+    return Comparison(tuple(entries), contradicting)
 
 
 def every_solver() -> tuple[solvers.Solver, ...]:
@@ -270,30 +273,14 @@ def _against(entry: Entry, reference: Entry) -> Entry:
     found, known = entry.contact, reference.contact
     if found is None or known is None:
         return entry
+    apart, scale = float(np.abs(found.loads - known.loads).max()), float(known.loads.max())
+    low, high = np.sort([np.abs(found.loads), known.loads], axis=0) / (scale or 1.0)
     return replace(
         entry,
-        disagreement=_relative(found.loads - known.loads, known.loads),
+        disagreement=apart / scale if apart > 0 else 0.0,
         different_statuses=int(np.sum(found.status != known.status)),
-        different_contacts=_different_contacts(found.loads, known.loads),
+        different_contacts=int(((low < CARRIES / 10) & (high > CARRIES)).sum()),
     )
-
-
-def _relative(difference: Array, loads: Array) -> float:
-    largest = float(np.abs(difference).max())
-    return largest / float(loads.max()) if largest > 0 else 0.0
-
-
-def _different_contacts(loads: Array, reference: Array) -> int:
-    pair = np.sort([np.abs(loads), reference], axis=0) / (float(reference.max()) or 1.0)
-    return int(((pair[0] < CARRIES / 10) & (pair[1] > CARRIES)).sum())
-
-
-def _load_code_of(solver: solvers.Solver) -> None:
-    """Solve a small problem, so that later times do not include imports by the solver."""
-    two = Asperities([[0.0, 0.0], [1.0, 0.0]], tip_radii=1.0)
-    small = Scene(1e3, two, Material(contact_modulus=1.0, poisson_ratio=0.3))
-    with suppress(Exception, SystemExit):  # `_enter` handles the same error later
-        press(small, approach=1e-2, solver=solver)
 
 
 class Answer(NamedTuple):

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks, solvers, threads
 from convexrough.arithmetic.balls import Ball
-from convexrough.arrays import Array, Indices, frozen
+from convexrough.arrays import Array, frozen
 from convexrough.cached import Cached
 from convexrough.convex.newton_step import correct
 from convexrough.errors import InputError, ProofError, SolverError
@@ -276,9 +276,7 @@ def press(
 
 
 def solve(
-    problem: NormalProblem,
-    solver: Solver | str | None = None,
-    start: ArrayLike | None = None,
+    problem: NormalProblem, solver: Solver | str | None = None, start: ArrayLike | None = None
 ) -> Contact:
     """The contact of an assembled problem; `solver` and `start` are as for `press`."""
     return _contact(problem, solvers.named(solver), start, time.perf_counter())
@@ -288,7 +286,13 @@ def levels_of(contact: Contact) -> Levels:
     """The normal solutions (levels) of a contact's scene at loads up to that of the contact."""
     named = {each().name: each for each in solvers.SOLVERS.values()}
     solver: Solver = vars(contact).get("_by") or named.get(contact.solver, solvers.Newton)()
-    top = vars(contact).get("_top") or _proved_again(contact, solver)
+    top: Level | None = vars(contact).get("_top")
+    if top is None:  # prove the loads again
+        load = contact.prescribed_load
+        approach = contact.approach if load is None else None
+        problem = assembled(solver, contact.scene, approach, load, contact.influence)
+        given = contact.loads[problem.candidates] / problem.units.force
+        top = proved(problem, refined_loads(problem, given))
     assert top.trial is not None
     loads = top.trial.loads.high
 
@@ -301,14 +305,6 @@ def levels_of(contact: Contact) -> Levels:
     return Levels(top, pressed, together=isinstance(solver, solvers.Newton))
 
 
-def _proved_again(contact: Contact, solver: Solver) -> Level:
-    load = contact.prescribed_load
-    approach = contact.approach if load is None else None
-    problem = assembled(solver, contact.scene, approach, load, contact.influence)
-    loads = contact.loads[problem.candidates] / problem.units.force
-    return proved(problem, refined_loads(problem, loads))
-
-
 def assembled(
     solver: Solver,
     scene: Scene,
@@ -319,21 +315,15 @@ def assembled(
 ) -> NormalProblem:
     """The problem that `press` solves, with the asperities that can touch (see `FEW`)."""
     few = len(scene) <= FEW and isinstance(solver, solvers.Newton)
-    if few and highest is None and load is not None:
-        highest = np.inf
-    return NormalProblem.assemble(
-        scene, approach=approach, load=load, influence=influence, highest=highest
-    )
+    highest = np.inf if few and highest is None and load is not None else highest
+    given = {"approach": approach, "load": load, "highest": highest}
+    return NormalProblem.assemble(scene, **given, influence=influence)
 
 
 def _contact(
-    problem: NormalProblem,
-    solver: Solver,
-    start: ArrayLike | None,
-    began: float,
+    problem: NormalProblem, solver: Solver, start: ArrayLike | None, began: float
 ) -> Contact:
-    scene = problem.scene
-    force = problem.units.force
+    scene, force = problem.scene, problem.units.force
     first, top = None, None
     if start is not None:
         given = checks.array("start", start, length=len(scene), sign="not negative")
@@ -407,9 +397,8 @@ def _model_limits(problem: NormalProblem, solution: Solution, radii: Array) -> t
     touching = np.flatnonzero((solution.loads > 0) & (prescribed > 0))
     if len(touching) < 2:
         return 0.0, 0.0
-    A: Influence = problem.influence
-    if len(touching) < len(problem):
-        A = A.restricted(touching)
+    all_touch = len(touching) == len(problem)
+    A = problem.influence if all_touch else problem.influence.restricted(touching)
     a = radii[touching]
     moved = A.scale * A.falloff(solution.loads[touching] * a**2 / 10, 3)
     return float((moved / prescribed[touching]).max()), A.crowding(a)
@@ -432,14 +421,11 @@ def covered(scene: Scene, radii: Array) -> int:
 def closest_changes(contact: Contact) -> Array:
     """(n,) [force] first-order changes of loads from the geometry "summit" to "closest".
 
-    The approach is constant.
-
-    They are 0 if the scene has the geometry "closest" already. In this geometry an asperity of tip
-    radius rho at the distance r from the axis touches a sphere of radius R at the distance
-    r R / (R + rho) from the axis. Its offset (`Scene.offsets`) is greater by
-    r^2 rho / (2 R (R + rho)) than in the geometry "summit". The contact points are nearer to each
-    other by a fraction of about rho / R, and the compliances between them are greater by this
-    fraction. With the compliance operator A, the changes of loads dP satisfy
+    The approach is constant; the changes are 0 if the geometry is "closest" already. In it an
+    asperity of tip radius rho at the distance r from the axis touches a sphere of radius R at the
+    distance r R / (R + rho). Its offset (`Scene.offsets`) is greater by r^2 rho / (2 R (R + rho)).
+    Distances between contact points are smaller by a fraction of about rho / R, and compliances
+    greater. With the compliance operator A, the changes of loads dP satisfy
 
         (H + A) dP = r^2 rho / (2 R (R + rho)) - (rho / R) A P,
 
@@ -461,18 +447,20 @@ def closest_changes(contact: Contact) -> Array:
     for R, axes in scene.curved:
         squares = (scene.asperities.positions[touching, axes] ** 2).sum(axis=1)
         lift += squares * rho / (2.0 * R * (R + rho)) / units.length
-    deeper = lift - _nearer(scene, touching, A, loads / units.force)
+    radii = along(scene.sphere_radius)
+    if radii[0] == radii[1]:
+        nearer = rho / radii[0] * A.apply(loads / units.force)
+    else:
+        moved = -scene.asperities.positions[touching] * rho[:, None] / np.array(radii)
+        nearer = turned(A, moved, loads / units.force)
+    deeper = lift - nearer
     change = correct(A, shells(A), np.sqrt(slopes), -deeper, balanced=False, tolerance=1e-3)
     gains[touching] = slopes * change * units.force
     return frozen(gains)
 
 
-def _nearer(scene: Scene, touching: Indices, A: Influence, loads: Array) -> Array:
-    """(m,) increase of A P, P = `loads`, if points move towards the axis by a fraction rho / R."""
-    rho, radii = scene.asperities.tip_radii[touching], along(scene.sphere_radius)
-    if radii[0] == radii[1]:
-        return np.asarray(rho / radii[0] * A.apply(loads))
-    moved = -scene.asperities.positions[touching] * rho[:, None] / np.array(radii)
+def turned(A: Influence, moved: Array, loads: Array) -> Array:
+    """(n,) change of A P, P = `loads`, if the points of A move by `moved` (n, 2)."""
     gained = (moved * A.slopes(loads)).sum(axis=1)
     for k in (0, 1):
         gained -= A.slopes(moved[:, k] * loads)[:, k]

@@ -35,10 +35,8 @@ def peak_pressures(contact: Contact) -> Array:
     """
     checks.instance("contact", contact, Contact)
     scene = contact.scene
-    peaks: Array = hertz.peak_pressure(
-        contact.contact_radii, scene.material.contact_modulus, scene.relative_radii
-    )
-    return peaks
+    modulus, R = scene.material.contact_modulus, scene.relative_radii
+    return np.asarray(hertz.peak_pressure(contact.contact_radii, modulus, R))
 
 
 def pressure(contact: Contact, points: ArrayLike) -> Array:
@@ -51,9 +49,9 @@ def pressure(contact: Contact, points: ArrayLike) -> Array:
     >>> print(cr.fields.pressure(contact, line).round(4))
     [0.0214 0.     0.0128 0.0128 0.     0.0181]
     """
-    checks.instance("contact", contact, Contact)
+    peaks = peak_pressures(contact)
     touching, centres, radii = _discs(contact)
-    return superpose(points, centres, radii, peak_pressures(contact)[touching])
+    return superpose(points, centres, radii, peaks[touching])
 
 
 def normal_displacement(contact: Contact, points: ArrayLike) -> Array:
@@ -68,9 +66,8 @@ def normal_displacement(contact: Contact, points: ArrayLike) -> Array:
     """
     touching, centres, a = _discs(contact)
     R = contact.scene.relative_radii[touching]
-    return _sum_everywhere(
-        points, centres, lambda x, y: hertz.surface_displacement(np.hypot(x, y), a, R)
-    )
+    field = hertz.surface_displacement
+    return _sum_everywhere(points, centres, lambda x, y: field(np.hypot(x, y), a, R))
 
 
 def traction(state: ShearState, points: ArrayLike) -> Array:
@@ -86,12 +83,11 @@ def traction(state: ShearState, points: ArrayLike) -> Array:
     0.094
     """
     centres, a, shares, peaks = _sheared(state)
-    return _sum_over_discs(
-        points,
-        centres,
-        a,
-        lambda r, disc: surface_shear.traction(r, a[disc], shares[disc], peaks[disc]),
-    )
+
+    def profile(r: Array, disc: Indices) -> Array:
+        return np.asarray(surface_shear.traction(r, a[disc], shares[disc], peaks[disc]))
+
+    return _sum_over_discs(points, centres, a, profile)
 
 
 def shear_displacement(state: ShearState, points: ArrayLike) -> Array:
@@ -110,12 +106,9 @@ def shear_displacement(state: ShearState, points: ArrayLike) -> Array:
     """
     centres, a, shares, peaks = _sheared(state)
     material = state.contact.scene.material
-    body = material.shear_modulus, material.poisson_ratio
-    return _sum_everywhere(
-        points,
-        centres,
-        lambda x, y: surface_shear.surface_displacement(x, y, a, shares, peaks, *body),
-    )
+    body = a, shares, peaks, material.shear_modulus, material.poisson_ratio
+    field = surface_shear.surface_displacement
+    return _sum_everywhere(points, centres, lambda x, y: field(x, y, *body))
 
 
 def _discs(contact: Contact) -> tuple[Indices, Array, Array]:
@@ -129,11 +122,10 @@ def _sheared(state: ShearState) -> tuple[Array, Array, Array, Array]:
 
     Q_i / (f P_i) is exactly 1 or -1 if the asperity slides.
     """
-    contact = state.contact
-    friction = checks.friction(contact.scene.friction)
+    contact, f = state.contact, checks.friction(state.contact.scene.friction)
     touching, centres, radii = _discs(contact)
-    shares = state.forces[touching] / (friction * contact.loads[touching])
-    return centres, radii, shares, friction * peak_pressures(contact)[touching]
+    shares = state.forces[touching] / (f * contact.loads[touching])
+    return centres, radii, shares, f * peak_pressures(contact)[touching]
 
 
 def cell_areas(points: Array) -> Array:
@@ -179,12 +171,8 @@ def superpose(points: ArrayLike, centres: Array, radii: Array, peaks: Array) -> 
     >>> cr.fields.superpose([[0.6, 0.0], [2.0, 0.0]], np.zeros((1, 2)), np.ones(1), np.ones(1))
     array([0.8, 0. ])
     """
-    return _sum_over_discs(
-        points,
-        centres,
-        radii,
-        lambda distances, disc: hertz.pressure(distances, radii[disc], peaks[disc]),
-    )
+    profile = hertz.pressure
+    return _sum_over_discs(points, centres, radii, lambda r, i: profile(r, radii[i], peaks[i]))
 
 
 def _sum_over_discs(
@@ -193,8 +181,7 @@ def _sum_over_discs(
     """(...) sum_i profile(|r - r_i|, i) over the discs that may contain the point r."""
     from scipy.spatial import cKDTree  # takes 0.1 s to import
 
-    places = _places(points)
-    flat = places.reshape(-1, 2)
+    flat, shape = _places(points)
     total = np.zeros(len(flat))
     tree = cKDTree(flat)
     octaves = np.frexp(radii)[1]
@@ -205,25 +192,25 @@ def _sum_over_discs(
         )
         values = profile(near["v"], group[near["j"]])
         total += np.bincount(near["i"], weights=values, minlength=len(flat))
-    return total.reshape(places.shape[:-1])
+    return total.reshape(shape)
 
 
 def _sum_everywhere(
     points: ArrayLike, centres: Array, field: Callable[[Array, Array], Array]
 ) -> Array:
     """(...) sum_i field_i(r - r_i); `field` takes x and y (m, n) of m points from n centres."""
-    places = _places(points)
-    flat = places.reshape(-1, 2)
+    flat, shape = _places(points)
     total = np.zeros(len(flat))
     size = max(1, BLOCK // max(1, len(centres)))
     for start in range(0, len(flat), size):
         block = slice(start, start + size)
         x, y = np.moveaxis(flat[block, None] - centres, 2, 0)
         total[block] = field(x, y).sum(axis=1)
-    return total.reshape(places.shape[:-1])
+    return total.reshape(shape)
 
 
-def _places(points: ArrayLike) -> Array:
+def _places(points: ArrayLike) -> tuple[Array, tuple[int, ...]]:
+    """The points as an array (m, 2), and the shape (...) of a result."""
     expected = "finite numbers of shape (..., 2): x and y of each point"
     try:
         places = np.asarray(points, dtype=np.float64)
@@ -233,4 +220,4 @@ def _places(points: ArrayLike) -> Array:
         raise InputError("points", found=f"shape {places.shape}", expected=expected)
     if not np.isfinite(places).all():
         raise InputError("points", found="nan or infinity", expected=expected)
-    return places
+    return places.reshape(-1, 2), places.shape[:-1]

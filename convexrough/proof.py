@@ -12,11 +12,12 @@ import json
 import math
 import os
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,12 +26,11 @@ from scipy.spatial.distance import cdist
 
 from convexrough import checker, checks
 from convexrough.arithmetic.pairs import Pair
-from convexrough.arrays import Array
+from convexrough.arrays import Array, among_zeros
 from convexrough.atomic import replacing
 from convexrough.errors import InputError, ProofError
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.refine import Trial, trial_of
-from convexrough.progress import LOGGER
 from convexrough.record import Record
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
@@ -125,9 +125,9 @@ def prove(
     ]
     refusal = "contacts overlap too much for the energy to be proved convex near these loads"
     for argument in trial.arguments():
-        document["argument"] = _written(argument._asdict())
+        document["argument"] = _written(argument)
         try:
-            proved = checker.prove(document, LOGGER.info)
+            proved = checker.prove(document)
         except checker.Refused as error:
             refusal = str(error)
         else:
@@ -162,46 +162,27 @@ def _exact_loads(trial: Trial) -> list[Fraction]:
 
 
 def _document(scene: Scene, prescribed: dict[str, Any]) -> dict[str, Any]:
-    """The contents of the file; `argument`, `pressed`, `sheared` and `claims` are still empty."""
-    x, y = scene.asperities.positions.T
-    given = {
-        "sphere_radius": scene.sphere_radius,
-        "contact_modulus": scene.material.contact_modulus,
-        "poisson_ratio": scene.material.poisson_ratio,
-        "friction": scene.friction,
-        "geometry": scene.geometry,
-        "x": x,
-        "y": y,
-        "heights": scene.asperities.heights,
-        "tip_radii": scene.asperities.tip_radii,
-    }
-    return {
-        "format": checker.FORMAT,
-        "scene": _written(given),
-        "prescribed": _written(prescribed),
-        "sha256": checker.digest(_written(given), _written(prescribed)),
-        "argument": None,
-        "pressed": None,
-        "sheared": [],
-        "claims": None,
-    }
+    """The contents of the file; `argument`, `pressed`, `sheared` and `claims` are still None."""
+    material, asperities = scene.material, scene.asperities
+    single = scene.sphere_radius, material.contact_modulus, material.poisson_ratio, scene.friction
+    several = *asperities.positions.T, asperities.heights, asperities.tip_radii
+    names = (*checker.SINGLE, *checker.SEVERAL)
+    given = _written(dict(zip(names, (*single, scene.geometry, *several), strict=True)))
+    found = {"format": checker.FORMAT, "scene": given, "prescribed": _written(prescribed)}
+    found["sha256"] = checker.digest(given, found["prescribed"])
+    return dict.fromkeys(checker.KEYS) | found
 
 
 def _place(document: dict[str, Any], near: Trial) -> dict[str, Any]:
     """The entry of the file for a state: contact radii to thirty digits, and the approach."""
     scene, (high, low) = checker.read_scene(document["scene"]), near.approach.mid
     approach = (Fraction(float(high)) + Fraction(float(low))) * Fraction(near.problem.units.length)
-    radii = [
-        _cube_root(load * R * Fraction(3, 4) / scene.modulus)
-        for load, R in zip(_exact_loads(near), scene.radii, strict=True)
-    ]
+    radii = []
+    for load, R in zip(_exact_loads(near), scene.radii, strict=True):
+        cube = load * R * Fraction(3, 4) / scene.modulus
+        radius = Fraction(math.cbrt(cube))
+        radii.append(radius + (cube - radius**3) / (3 * radius**2) if radius else radius)
     return {"radii": [_digits(radius) for radius in radii], "approach": _digits(approach)}
-
-
-def _cube_root(x: Fraction) -> Fraction:
-    """The cube root of x to about thirty digits."""
-    near = Fraction(math.cbrt(x))
-    return near + (x - near**3) / (3 * near**2) if near else near
 
 
 def _digits(x: Fraction) -> list[str]:
@@ -219,44 +200,21 @@ def _written(value: Any) -> Any:
     if isinstance(value, float | int):
         return float(value).hex()
     if isinstance(value, checker.Interval):
-        return [_beyond(value.low, -math.inf), _beyond(value.high, math.inf)]
+        low, high = float(value.low), float(value.high)
+        low = math.nextafter(low, -math.inf) if low > value.low else low
+        high = math.nextafter(high, math.inf) if high < value.high else high
+        return [low.hex(), high.hex()]
     return [_written(item) for item in value]
-
-
-def _beyond(bound: Fraction, end: float) -> str:
-    """The bound rounded towards `end` to a float64 number in hexadecimal."""
-    value = float(bound)
-    if (Fraction(value) - bound) * int(math.copysign(1, end)) < 0:
-        value = math.nextafter(value, end)
-    return value.hex()
-
-
-class Argument(NamedTuple):
-    """The claim that the energy is strongly convex for contact radii 0 <= a <= box.
-
-    box     : (n,) [length] 0 for asperities that are fixed open
-    shells  : (n,) [length] radii of shells; None for a Cholesky factorisation
-    ceiling : [length] a number above all (A P)_i; None if the approach is prescribed
-    """
-
-    box: Array
-    convexity_number: float
-    shells: Array | None
-    ceiling: float | None
 
 
 @dataclass(frozen=True, eq=False)
 class TrialState:
-    """Contact radii (n,) [length] near a solution.
-
-    largest  : (n,) [length] the largest contact radii in this and in all friction states
-    approach : [length] the prescribed approach, or None
-    """
+    """Contact radii (n,) [length] near a solution."""
 
     scene: Scene
     radii: Array
-    largest: Array
-    approach: float | None
+    largest: Array  # (n,) [length] the largest in this and in all friction states
+    approach: float | None  # [length] the prescribed approach, or None
 
     @cached_property
     def apart(self) -> Array:
@@ -266,60 +224,42 @@ class TrialState:
         return distances
 
     @cached_property
-    def loads(self) -> Array:
-        """(n,) loads / E*."""
-        return np.asarray(4 * self.radii**3 / (3 * self.scene.relative_radii))
-
-    @cached_property
-    def local(self) -> Array:
-        """(n,) [length] indentations a^2 / R by the asperities' own loads."""
-        return self.radii**2 / self.scene.relative_radii
-
-    @cached_property
-    def pushed(self) -> Array:
-        """(n,) [length] displacements A P by the loads on other asperities."""
-        return (1 / self.apart) @ self.loads / np.pi
-
-    @cached_property
     def ceiling(self) -> tuple[float | None, float]:
-        """`Argument.ceiling`, and an upper bound [length] on the approach of every solution.
+        """A number [length] above all (A P)_i, and the bound on D0 of all solutions that follows.
 
-        The bound follows from the ceiling. If the approach D0 is prescribed, the ceiling is None
-        and the bound is D0.
+        If the approach D0 is prescribed, they are None and D0.
         """
         if self.approach is not None:
             return None, self.approach
-        loaded = self.loads > 0
-        p, w, R = self.loads[loaded], self.pushed[loaded], self.scene.relative_radii[loaded]
+        radii, R = self.radii, self.scene.relative_radii
+        loads = 4 * radii**3 / (3 * R)  # divided by E*
+        pushed = (1 / self.apart) @ loads / np.pi  # A P
+        least, most = pushed.max(), (2 / 3 * (radii**2 / R) + pushed).max()
+        loaded = loads > 0
+        p, w, R = loads[loaded], pushed[loaded], R[loaded]
         share = p / p.sum()
-        least, most = self.pushed.max(), (2 / 3 * self.local + self.pushed).max()
         tops = [least + (most - least) * 0.75**k for k in range(12)]
         bounds = [top + float(share @ ((p / (top - w)) ** 2 / (12 * R))) for top in tops]
         best, bound = min(zip(tops, bounds, strict=True), key=lambda each: each[1])
         drop = float(share @ self.scene.offsets[loaded])
         return float(best), bound - drop + ROUNDING * (bound + abs(drop))
 
-    def arguments(self) -> Iterator[Argument]:
-        """The arguments that hold in floating point; those for the scope "global" come first."""
-        for beyond, least in ROOM:
-            yield from self._on(self._box(beyond, least))
-        for beyond in LEEWAY:
-            yield from self._on(self.largest * (1 + beyond))
+    def arguments(self) -> Iterator[dict[str, Any]]:
+        """The arguments that hold in floating point; those for the scope "global" come first.
 
-    def _on(self, box: Array) -> Iterator[Argument]:
-        """At most two arguments on a box: by shells that do not overlap, and by `_crowded`."""
-        shells, able = self._room(box) * (1 - ROUNDING), box > 0
-        least = float((2 * box[able] / (np.pi * shells[able])).max(initial=ROUNDING))
-        if (number := least * (1 + ROUNDING)) < 1:
-            yield Argument(box, number, shells, self.ceiling[0])
-        if crowded := self._crowded(box):
-            yield crowded
-
-    def _room(self, box: Array) -> Array:
-        """(n,) [length] half the distances to the nearest asperity in the box; 0 for others."""
-        able = box > 0
-        nearest = self.apart[able].min(axis=0, initial=4 * box.max(initial=0.0))
-        return np.where(able, nearest / 2, 0.0)
+        Each is the entry of the file: (n,) [length] the box, 0 for asperities that are fixed open;
+        the convexity number; (n,) [length] radii of shells, or None for a Cholesky factorisation;
+        and `ceiling`.
+        """
+        boxes = [*(self._box(*each) for each in ROOM), *(self.largest * (1 + x) for x in LEEWAY)]
+        for box in boxes:
+            for number, shells in self._convex(box):
+                yield {
+                    "box": box,
+                    "convexity_number": number,
+                    "shells": shells,
+                    "ceiling": self.ceiling[0],
+                }
 
     def _box(self, beyond: float, least: float) -> Array:
         """(n,) [length] upper bounds on the radii of every solution; 0 where none can touch."""
@@ -331,27 +271,33 @@ class TrialState:
         box[(deepest < -ROUNDING * size) & (self.largest == 0)] = 0.0
         return box
 
-    def _crowded(self, box: Array) -> Argument | None:
-        """An argument by overlapping shells or, if none is found, by a Cholesky factorisation."""
+    def _convex(self, box: Array) -> Iterator[tuple[float, Array | None]]:
+        """At most two pairs of a convexity number and shells.
+
+        The shells of the first do not overlap, those of the second may. If such shells are not
+        found, the second is for a Cholesky factorisation.
+        """
         able = np.flatnonzero(box)
+        nearest = self.apart[able].min(axis=0, initial=4 * box.max(initial=0.0))
+        shells = np.where(box > 0, nearest / 2, 0.0) * (1 - ROUNDING)
+        least = float((2 * box[able] / (np.pi * shells[able])).max(initial=ROUNDING))
+        if (number := least * (1 + ROUNDING)) < 1:
+            yield number, shells
         apart = self.apart[np.ix_(able, able)]
         for number in CROWDED:
-            least = 2 * box[able] / (np.pi * number)  # t_i of docs/theory/proof-file-steps.md, (3)
+            smallest = 2 * box[able] / (np.pi * number)  # t of docs/theory/proof-file-steps.md, (3)
             for width in WIDTHS:
-                s = width * least
+                s = width * smallest
                 over = np.maximum(s[:, None] + s - apart, 0.0)
                 overlaps = (over**2 / (4 * apart)).sum(axis=1) * (1 + ROUNDING)
                 if (overlaps < s * (width - 1)).all():
-                    shells = np.zeros(len(box))
-                    shells[able] = s * (1 + ROUNDING)
-                    return Argument(box, number, shells, self.ceiling[0])
+                    yield number, among_zeros(s * (1 + ROUNDING), able, len(box))
+                    return
         root = np.sqrt(2 * box[able])
         scaled = root[:, None] / (np.pi * apart) * root
         for number in CROWDED:
             np.fill_diagonal(scaled, number - ROUNDING)
-            try:
+            with suppress(LinAlgError):
                 cholesky(scaled, lower=True, check_finite=False)
-            except LinAlgError:
-                continue
-            return Argument(box, number, None, self.ceiling[0])
-        return None
+                yield number, None
+                return

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, TypeAlias
@@ -9,8 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough import frames
-from convexrough.errors import InputError
+from convexrough.errors import InputError, needed
 
 if TYPE_CHECKING:
     import pandas
@@ -18,6 +18,12 @@ if TYPE_CHECKING:
 
 #: For names of dimensions: the attributes whose arrays have these dimensions.
 Along: TypeAlias = dict[tuple[str, ...], tuple[str, ...]]
+
+#: By name: the dimensions of an array, and the array. Those of the first are the rows of a frame.
+Variables: TypeAlias = dict[str, tuple[tuple[str, ...], NDArray[Any]]]
+
+#: For a dimension: the names of the components of a vector, or of the sides of a point of a path.
+NAMED = {"direction": ["x", "y"], "side": ["below", "above"]}
 
 #: Names that `singular` leaves in the plural: counts and times.
 COUNTS = ("seconds", "iterations", "presses", "summits", "contacts")
@@ -124,18 +130,33 @@ class Table(Record):
 
         Raises ExtraError if pandas is not installed.
         """
-        return frames.dataframe(self._variables(), self._attributes())
+        variables = self._variables()
+        rows, _ = next(iter(variables.values()))
+        columns: dict[str, NDArray[Any]] = {}
+        for name, (along, values) in variables.items():
+            if along == rows:
+                columns[name] = values
+            elif along == (*rows, "direction"):
+                columns |= {f"{name}_x": values[:, 0], f"{name}_y": values[:, 1]}
+        frame = frame_of(columns, **self._attributes())
+        frame.index.name = rows[0]
+        return frame
 
     def to_xarray(self) -> xarray.Dataset:
-        """An xarray data set of all arrays, with named dimensions.
+        """An xarray data set of writable copies of all arrays, with named dimensions.
 
         Fields that are one number or text are in `attrs`. Raises ExtraError if xarray is not
         installed.
         """
-        return frames.dataset(self._variables(), self._attributes())
+        variables = self._variables()
+        arrays = {name: (along, np.array(values)) for name, (along, values) in variables.items()}
+        used = {dimension for along, _ in arrays.values() for dimension in along}
+        named = {dimension: names for dimension, names in NAMED.items() if dimension in used}
+        found: xarray.Dataset = needed("xarray").Dataset(arrays, named, self._attributes())
+        return found.set_coords(sorted({"x", "y", "asperity"} & set(arrays)))
 
-    def _variables(self) -> frames.Variables:
-        places: frames.Variables = {}
+    def _variables(self) -> Variables:
+        places: Variables = {}
         if (scene := getattr(getattr(self, "contact", self), "scene", None)) is not None:
             x, y = scene.asperities.positions.T
             places = {"x": (("asperity",), x), "y": (("asperity",), y)}
@@ -166,6 +187,14 @@ class Proved(Table):
             f"{type(self).__name__}: neither true nor false; `all_proved` is about statuses only, "
             "and `verify` judges loads"
         )
+
+
+def frame_of(columns: Mapping[str, NDArray[Any]], /, **attributes: Any) -> pandas.DataFrame:
+    """A data frame of columns with equal lengths."""
+    frame: pandas.DataFrame = needed("pandas").DataFrame({**columns}, copy=True)
+    frame.index.name = "row"
+    frame.attrs.update(attributes)
+    return frame
 
 
 def rows_of(columns: Mapping[str, NDArray[Any]]) -> list[dict[str, Any]]:
@@ -202,7 +231,8 @@ def _of_array(values: NDArray[Any]) -> str:
     if values.size == 0:
         return "none"
     if values.dtype.kind == "U":
-        return ", ".join(_counted(values.ravel()))
+        counts = Counter(values.ravel().tolist())
+        return ", ".join(f"{count:,} {status}" for status, count in counts.items())
     if values.dtype.kind == "b":
         return f"{np.count_nonzero(values):,} of {values.size:,}"
     if values.size <= FEW:
@@ -212,10 +242,3 @@ def _of_array(values: NDArray[Any]) -> str:
         return f"{size} indices: {', '.join(map(str, values.ravel()[:FEW]))}, ..."
     low, high = np.fmin.reduce(values, axis=None), np.fmax.reduce(values, axis=None)
     return f"{size} from {low:.6g} to {high:.6g}"
-
-
-def _counted(statuses: NDArray[np.str_]) -> Iterator[str]:
-    while len(statuses):
-        same = statuses == statuses[0]
-        yield f"{np.count_nonzero(same):,} {statuses[0]}"
-        statuses = statuses[~same]

@@ -37,18 +37,13 @@ CYCLE = ("losses", "loss_errors", "displacement_amplitudes", "displacement_error
 
 
 class PressedRows(NamedTuple):
-    """m scenes whose solutions were proved together, in a stack of m rows.
+    """m scenes whose solutions were proved together, in a stack of m rows."""
 
-    places  : (m,) indices of the scenes;  problem : a problem that has the units of the stack
-    stack, box : the problems, and the boxes of loads in which their solutions were proved
-    high    : the solutions
-    """
-
-    places: Indices
-    problem: NormalProblem
+    places: Indices  # (m,) of the scenes
+    problem: NormalProblem  # one that has the units of the stack
     stack: Stack
-    box: Box
-    high: Rows
+    box: Box  # the boxes of loads in which the solutions were proved
+    high: Rows  # the solutions
 
     def contacts(self) -> dict[str, NDArray[Any]]:
         """The fields of `Contacts` for these rows, by name."""
@@ -119,9 +114,11 @@ def _in_rows(scenes: Sequence[Scene], controls: Array, by_load: bool) -> Iterato
     for places in families.values():
         highest = [controls[k] + (0.0 if by_load else scenes[k].offsets.max()) for k in places]
         first = places[int(np.argmax(highest))]
-        problem = _leader(scenes[first], float(controls[first]), by_load)
-        if problem is not None:
+        control = {"load" if by_load else "approach": float(controls[first])}
+        problem = NormalProblem.assemble(scenes[first], **control, influence="dense")
+        if len(problem):  # an asperity can touch; all become candidates
             key = problem.units, *_family(problem.scene)[2:5]
+            problem = problem.widened(np.arange(len(problem.scene)))
             alike.setdefault(key, []).append((problem, places))
     some = max(1, min(MATRICES // len(scenes[0]) ** 2, NUMBERS // len(scenes[0])))
     for group in alike.values():
@@ -138,16 +135,6 @@ def _family(scene: Scene) -> tuple[Any, ...]:
     return *shape, scene.sphere_radius, *elastic, scene.geometry
 
 
-def _leader(scene: Scene, control: float, by_load: bool) -> NormalProblem | None:
-    """The problem in which all asperities of a scene are candidates; None if none can touch.
-
-    control : the load [force] if `by_load` is True, else the approach [length]
-    """
-    approach, load = (None, control) if by_load else (control, None)
-    problem = NormalProblem.assemble(scene, approach=approach, load=load, influence="dense")
-    return problem.widened(np.arange(len(scene))) if len(problem) else None
-
-
 def _proved(
     every: Sequence[tuple[NormalProblem, int]],
     scenes: Sequence[Scene],
@@ -158,18 +145,18 @@ def _proved(
     first, places = every[0][0], np.array([k for _, k in every])
     n, units = len(first), first.units
     coupled, offsets, known = list[tuple[slice, NormalProblem]](), list[Ball](), list[Ball]()
-    wells, start = list[Array](), 0
+    shelled, start = np.empty((len(every), n)), 0
     for _, group in groupby(every, key=lambda each: id(each[0])):
         family = list(group)
         problem, m = family[0][0], len(family)
         coupled.append((slice(start, start + m), problem))
         offsets.append(_offsets(problem, [scenes[k] for _, k in family]))
-        known.append(of_rows(partial(_repeated, shape=(m, n)), problem.exact.coefficients))
-        wells.append(_repeated(problem.shells, shape=(m, n)))
+        repeated = partial(np.broadcast_to, shape=(m, n))
+        known.append(of_rows(repeated, problem.exact.coefficients))
+        shelled[start : start + m] = problem.shells
         start += m
     unit = units.force if by_load else units.length
     given = Ball.exact(controls[places][:, None]).scaled(1.0 / unit)
-    shelled = np.concatenate(wells)
     exact = Data(joined(known), joined(offsets), first.exact.scale)
     squares = np.array([scenes[k].asperities.distances for k in places]) ** 2
     rows = Stack.of(coupled, exact, shelled, squares, given, by_load)
@@ -178,10 +165,6 @@ def _proved(
     if len(good) and level.box is not None:
         some = rows.only(good), level.box.at(good), level.rows.at(good)
         yield PressedRows(places[good], first, *some)
-
-
-def _repeated(values: Array, shape: tuple[int, int]) -> Array:
-    return np.array(np.broadcast_to(values, shape))
 
 
 def _offsets(problem: NormalProblem, rows: Sequence[Scene]) -> Ball:

@@ -18,9 +18,8 @@ from typing import Any, ClassVar, NamedTuple, TypeAlias
 import numpy as np
 
 from convexrough.errors import InputError
-from convexrough.frames import Variables
 from convexrough.plottable import Plottable
-from convexrough.record import Along, Table, in_text
+from convexrough.record import Along, Table, Variables, in_text
 
 #: A point (P, T = Q / f) of a path, as exact fractions.
 Point: TypeAlias = tuple[Fraction, Fraction]

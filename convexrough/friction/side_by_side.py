@@ -19,7 +19,6 @@ from convexrough.arrays import Array, Indices
 from convexrough.contact import Contact
 from convexrough.convex.cones import FIVE_CONES_LIMIT, FOUR_CONES_LIMIT, power_cones
 from convexrough.errors import SolverError
-from convexrough.frames import Variables
 from convexrough.friction.general_step import OwnStep, Step, Stepper
 from convexrough.friction.order import Order
 from convexrough.friction.path import LoadPath, path_of, walk_of
@@ -27,7 +26,7 @@ from convexrough.influence import Kind, couple
 from convexrough.influence.shells import shells
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
-from convexrough.record import LINE, Record, Table
+from convexrough.record import LINE, Record, Table, Variables
 from convexrough.scene.scene import Scene
 from convexrough.solvers.programs import ConeProgram, run_clarabel
 

@@ -17,6 +17,7 @@ from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair
@@ -42,27 +43,24 @@ PAST, AGREES = Fraction(1, 2**36), 2.0**-20
 #: A difference of one-sided derivatives below this part of the largest derivative is neglected.
 NEGLIGIBLE = 2.0**-40
 
-#: The weights of V, D0 and S at one level in a weighted sum.
-Weights: TypeAlias = tuple[Fraction, ...]
-NOTHING: Weights = (Fraction(0),) * 3
+#: Rational numbers: the weights (3,) of V, D0 and S at a level, or P and T (m, 2) at m points.
+Exact: TypeAlias = NDArray[np.object_]
 
 #: For each segment: index of its end point, weight of its loss, weight of the final displacement.
 Steps: TypeAlias = Sequence[tuple[int, Fraction, Fraction]]
 
-#: Changes of P or of T at all points of a path, per unit of a parameter.
-Shifts: TypeAlias = Sequence[Fraction]
 
 #: The value of a derivative that does not exist or is infinite.
 NONE = Ball(Pair.exact(np.nan), np.asarray(np.inf))
 
 
-class Sums(dict[Fraction, Weights]):
+class Sums(dict[Fraction, Exact]):
     """The weights of V, D0 and S at each level."""
 
-    def add(self, level: Fraction, weight: Fraction, energy: Fraction, approach: Fraction) -> None:
-        """Add weights of V and D0, multiplied by `weight`."""
-        V, D, S = self.get(level, NOTHING)
-        self[level] = (V + weight * energy, D + weight * approach, S)
+    def add(self, level: Fraction, *weights: Fraction) -> None:
+        """Add weights of V, D0 and, if given, S."""
+        padded = np.array((*weights, Fraction(0))[:3])
+        self[level] = self[level] + padded if level in self else padded
 
     def add_loss(self, piece: Piece, weight: Fraction) -> None:
         """Add the loss (1 - c th) I on a piece times a weight; I is (4) of docs/theory/losses.md.
@@ -75,35 +73,46 @@ class Sums(dict[Fraction, Weights]):
         """
         weight *= 1 - piece.sign * piece.slope
         high, low, before, after = piece[2:]
-        run, fall = high - low, before - after
-        self.add(high, weight, 2 - fall / run, before - high)
-        self.add(low, weight, fall / run - 2, low - after)
+        run, fall = weight * (high - low), before - after
+        energy = weight * (2 - fall / (high - low))
+        self.add(high, energy, weight * (before - high))
+        self.add(low, -energy, weight * (low - after))
         if fall == 0:
-            self.add(before, weight, Fraction(0), -run)
+            self.add(before, Fraction(0), -run)
         else:
-            self.add(before, weight, -run / fall, Fraction(0))
-            self.add(after, weight, run / fall, Fraction(0))
+            self.add(before, -run / fall, Fraction(0))
+            self.add(after, run / fall, Fraction(0))
+
+    def gather(self, others: Sums, reach: Fraction) -> None:
+        """Add other weights, expanded about the nearest level here if it is within `reach`."""
+        places = sorted(self)
+        for level, (V, D, S) in others.items():
+            k = bisect(places, level)
+            around = places[max(k - 1, 0) : k + 1]
+            place = min(around, key=lambda each: abs(each - level), default=level)
+            if abs(off := level - place) > reach or not around:
+                place, off = level, Fraction(0)
+                insort(places, level)
+            self.add(place, V, D + V * off, S + D * off + V * off * off / 2)
 
 
 @dataclass(frozen=True)
 class Along:
-    """A path through points, with weights of its losses and displacements.
-
-    known : the normal solutions of the contact
-    start : [force] load at which the path begins, without shear
-    steps : the segments and their weights
-    loads, heights : [force] P and T at the points
-    """
+    """A path through points, with weights of its losses and displacements."""
 
     known: FrictionLevels
-    start: Fraction
+    start: Fraction  # [force] load at which the path begins, without shear
     steps: Steps
-    loads: Sequence[Fraction]
-    heights: Sequence[Fraction]
+    points: Exact  # (m, 2) [force] P and T
+
+    @property
+    def unit(self) -> Fraction:
+        """[force] the largest load."""
+        return Fraction(self.points[:, 0].max())
 
     @cached_property
     def walk(self) -> Walk:
-        points = [(self.loads[k], self.heights[k]) for k, _, _ in self.steps]
+        points = [(*self.points[k],) for k, _, _ in self.steps]
         return Walk(self.known, MemoryCurve.pressed(self.start), points)
 
     @cached_property
@@ -121,7 +130,7 @@ class Along:
             if displacement:
                 for level, bend in curve.bends:
                     if bend:
-                        moved.add(level, displacement, Fraction(0), bend)
+                        moved.add(level, Fraction(0), displacement * bend)
         return lost, moved
 
     def parts(self, moves: Moves) -> tuple[list[Part], list[Part]]:
@@ -148,39 +157,35 @@ class Along:
         vertices = {
             vertex for it in self.walk.curves for vertex in zip(it.levels, it.heights, strict=True)
         }
-        least = ROUNDED * max(self.loads)
+        least = ROUNDED * self.unit
         along = ({P + turn * T for P, T in vertices} for turn in (-1, 0, 1))
         return any(b - a < least for each in along for a, b in pairwise(sorted(each)))
 
-    def _shifted(self, loads: Shifts, heights: Shifts, by: Fraction) -> Along:
-        """The path after P and T at all points have changed by these shifts times `by`."""
-        return replace(
-            self,
-            loads=[load + by * each for load, each in zip(self.loads, loads, strict=True)],
-            heights=[T + by * each for T, each in zip(self.heights, heights, strict=True)],
-        )
-
-    def _one_side(
-        self, loads: Shifts, heights: Shifts, sign: int, times: Ball, off: Fraction = Fraction(0)
-    ) -> Ball:
-        """`times` times the derivative from above (sign 1) or below (-1), along these changes.
+    def _one_side(self, shift: Exact, sign: int, times: Ball, off: Fraction = Fraction(0)) -> Ball:
+        """`times` times the derivative from above (sign 1) or below (-1), along this shift.
 
         off : [force] distance by which the path is first shifted to the same side; the error bound
             does not include the effect of this shift
         """
-        unit, force = max(self.loads), self.known.units.force
-        longest = max(map(abs, (*loads, *heights))) or Fraction(1)
-        by = sign * SHIFT * unit / longest
+        unit, force = self.unit, self.known.units.force
+        scale = Fraction(sign) / (abs(shift).max() or 1)
+        by = scale * SHIFT * unit
         try:
-            origin = self._shifted(loads, heights, sign * off / longest) if off else self
-            both = origin.sums, origin._shifted(loads, heights, by).sums
+            origin = replace(self, points=self.points + off * scale * shift) if off else self
+            moved = replace(origin, points=origin.points + by * shift)
+            both = origin.sums, moved.sums
         except InputError:  # |T| > P, or a negative load
             return NONE
         total = ZERO
         factors = self.known.loss_unit, self.known.travel_unit * force
         for mine, base, there, factor in zip(self.sums, *both, factors, strict=True):
             slopes = _slopes(base, there, unit, by)
-            for level, (V, D, S) in (_near(slopes, mine, 4 * off) if off else slopes).items():
+            if off:
+                slopes, near = Sums({level: 0 * it for level, it in mine.items()}), slopes
+                slopes.gather(near, 4 * off)
+            for level, (V, D, S) in slopes.items():
+                if not (V or D or S):
+                    continue
                 unloaded = level <= NEAR * unit
                 if unloaded and S:
                     return NONE
@@ -191,31 +196,31 @@ class Along:
                 total = total + factor * each
         return total * times
 
-    def slopes(
-        self, directions: Sequence[tuple[Shifts, Shifts]], factor: Ball
-    ) -> tuple[Ball, Array]:
-        """(m,) the derivatives along m directions, times `factor`; (m, 2) their one-sided values.
+    def slopes(self, shifts: Exact, factor: Ball) -> tuple[Ball, Array]:
+        """(k,) the derivatives along k shifts, times `factor`; (k, 2) those from below and above.
 
-        The one-sided values are the derivatives from below and from above. The derivative is their
-        mean if they agree within their error bounds. It is nan if they differ or one does not
-        exist. If the path is nearly tied, one-sided derivatives at the distance PAST are computed,
-        too. If these differ, they become the one-sided values, and the derivative is nan.
+        A derivative is the mean of its one-sided values if these agree within their error bounds.
+        It is nan if they differ or one does not exist. If the path is nearly tied, one-sided
+        values at the distance PAST are computed, too; if they differ, they are the result.
 
-        directions : changes of P and of T at all points
+        shifts : (k, m, 2) changes of P and T at m points per unit of a parameter
         """
-        sides = [[self._one_side(*each, sign, factor) for sign in (-1, 1)] for each in directions]
-        found = [_one(below, above) for below, above in sides]
-        values = np.array([[float(s.value) for s in both] for both in sides])
+
+        def sides(off: Fraction = Fraction(0)) -> list[list[Ball]]:
+            return [[self._one_side(it, sign, factor, off) for sign in (-1, 1)] for it in shifts]
+
+        def floats(of: list[list[Ball]]) -> Array:
+            return np.array([[float(side.value) for side in both] for both in of])
+
+        exact = sides()
+        found, values = [_one(*both) for both in exact], floats(exact)
         if self.nearly_tied:
-            off = PAST * max(self.loads)
-            past = np.array([[float(self._one_side(*each, sign, factor, off).value)
-                              for sign in (-1, 1)] for each in directions])  # fmt: skip
+            past = floats(sides(PAST * self.unit))
             past = np.where(np.isnan(past), values, past)  # where a side does not exist
             below, above = past.T
             size = np.fmax.reduce(np.abs(past), axis=None, initial=0.0)
-            tied = np.abs(above - below) > AGREES * np.fmax(np.abs(below), np.abs(above)) + (
-                NEGLIGIBLE * size
-            )
+            allowed = AGREES * np.fmax(np.abs(below), np.abs(above)) + NEGLIGIBLE * size
+            tied = np.abs(above - below) > allowed
             for k in np.flatnonzero([float(each.error) > AGREES * size for each in found] | tied):
                 near, fine, values[k] = past[k].mean(), found[k], past[k]
                 known = Ball.around(near, float(fine.error) + abs(float(fine.value) - near))
@@ -230,43 +235,15 @@ def _one(below: Ball, above: Ball) -> Ball:
     return Ball.around((below + above).mid, apart.size) * 0.5 if apart.size else below
 
 
-def _moved(weights: Weights, off: Fraction) -> Weights:
-    """The weights moved down by `off`: V, D0 and S are expanded about the lower level."""
-    V, D, S = weights
-    return V, D + V * off, S + D * off + V * off * off / 2
-
-
-def _near(weights: dict[Fraction, Weights], levels: Sums, reach: Fraction) -> Sums:
-    """The weights moved to the nearest of these levels if it is within `reach`."""
-    found = Sums()
-    for level, each in weights.items():
-        nearest = min(levels, key=lambda place: abs(place - level), default=level)
-        place = nearest if abs(nearest - level) <= reach else level
-        both = zip(found.get(place, NOTHING), _moved(each, level - place), strict=True)
-        found[place] = tuple(b + m for b, m in both)
-    return found
-
-
-def _slopes(base: Sums, moved: Sums, unit: Fraction, by: Fraction) -> dict[Fraction, Weights]:
+def _slopes(base: Sums, moved: Sums, unit: Fraction, by: Fraction) -> Sums:
     """(moved - base) / by, as weights of V, D0 and S at levels of the original path.
 
     unit : the largest load; weights that are tiny in this unit are neglected
     """
-    places, found = sorted(base), dict[Fraction, Weights]()
-    for sign, weights in ((-1, base), (1, moved)):
-        for level, each in weights.items():
-            near = bisect(places, level)
-            around = [*places[max(near - 1, 0) : near + 1], level]
-            at = next(place for place in around if abs(place - level) <= NEAR * unit)
-            if at is level:  # no level of the original path corresponds
-                insort(places, at)
-            both = zip(found.get(at, NOTHING), _moved(each, level - at), strict=True)
-            found[at] = tuple(b + sign * m for b, m in both)
-    slopes = {level: tuple(w / by for w in weights) for level, weights in found.items()}
-    sizes = [abs(w) / unit**k for weights in slopes.values() for k, w in enumerate(weights)]
-    least = NEAR * max(sizes, default=Fraction(0))
-    nonzero = {
-        level: tuple(w if abs(w) > least * unit**k else Fraction(0) for k, w in enumerate(weights))
-        for level, weights in slopes.items()
-    }
-    return {level: weights for level, weights in nonzero.items() if any(weights)}
+    slopes = Sums({level: -weights for level, weights in base.items()})
+    slopes.gather(moved, NEAR * unit)
+    powers = by * np.array([Fraction(1), unit, unit**2])
+    least = NEAR * max((abs(weights / powers).max() for weights in slopes.values()), default=0)
+    for level, weights in slopes.items():
+        slopes[level] = np.where(abs(weights / powers) > least, weights / by, 0 * weights)
+    return slopes

@@ -15,23 +15,16 @@ from convexrough import checks
 from convexrough.arithmetic import balls
 from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, frozen
-from convexrough.contact import Contact
+from convexrough.contact import Contact, turned
 from convexrough.errors import InputError
 from convexrough.friction.shear import ShearState
 from convexrough.gradients.gradient import control_held, levels
-from convexrough.gradients.parts import ZERO, Part, product
+from convexrough.gradients.parts import ZERO, Bending, Geometry, Part, product
 from convexrough.gradients.results import by_ratio, level_below, with_friction
-from convexrough.gradients.scene import Bending, Geometry
 from convexrough.influence.choice import couple
 from convexrough.normal.level import Level, Response
 from convexrough.record import Along, Record, Table
 from convexrough.scene.base import sphere_radius
-
-#: The parameters of a direction that are single numbers.
-WHOLE = (
-    *("sphere_radius", "contact_modulus", "poisson_ratio", "friction"),
-    *("load", "approach", "force"),
-)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -63,9 +56,11 @@ class Direction(Record):
     force: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in WHOLE:
-            if (given := getattr(self, name)) is not None or name not in ("load", "approach"):
-                object.__setattr__(self, name, checks.finite(name, given))
+        for name in ("load", "approach"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, checks.finite(name, getattr(self, name)))
+        for name in ("sphere_radius", "contact_modulus", "poisson_ratio", "friction", "force"):
+            object.__setattr__(self, name, checks.finite(name, getattr(self, name)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -137,9 +132,9 @@ def _pressed(
     if direction.load is not None and direction.approach is not None:
         found, expected = "both", "at most one of the two"
         raise InputError("load, approach", found=found, expected=expected)
-    by_load = control_held(contact, None) == "load"
-    if direction.load is not None or direction.approach is not None:
-        by_load = direction.approach is None
+    by_load = direction.approach is None
+    if by_load and direction.load is None:
+        by_load = control_held(contact, None) == "load"
     top = levels(contact).top
     units = top.problem.units
     if by_load:
@@ -170,11 +165,8 @@ def _gap_changes(contact: Contact, bent: _Bent, loads: Array, approach: float) -
     scale = 1.0 / (np.pi * scene.material.contact_modulus)
     influence = couple(scene, np.arange(len(scene)), scale, contact.influence)
     moved = influence.apply(loads) - bent.modulus * influence.apply(contact.loads)
-    points = bent.everywhere.points.value
-    if points.any():
-        moved += (points * influence.slopes(contact.loads)).sum(axis=1)
-        for k in (0, 1):
-            moved -= influence.slopes(points[:, k] * contact.loads)[:, k]
+    if (points := bent.everywhere.points.value).any():
+        moved += turned(influence, points, contact.loads)
     return np.where(open_ones, moved - bent.everywhere.offsets.value - approach, 0.0)
 
 
@@ -214,18 +206,12 @@ def shear_change(state: ShearState, direction: Direction) -> ShearChange:
 
 @dataclass(frozen=True)
 class _Bent:
-    """The changes of a scene's geometry and modulus in one direction.
+    """The changes of a scene's geometry and modulus in one direction."""
 
-    everywhere, here : changes for all asperities, and for the candidates, which are the asperities
-        that can touch
-    geometry : the geometry of the candidates
-    modulus  : dlog E*, the relative change of the contact modulus
-    """
-
-    everywhere: Bending
-    here: Bending
-    geometry: Geometry
-    modulus: float
+    everywhere: Bending  # of all asperities
+    here: Bending  # of the candidates: the asperities that can touch
+    geometry: Geometry  # of the candidates
+    modulus: float  # dlog E*, the relative change of the contact modulus
 
     @classmethod
     def of(cls, top: Level, direction: Direction) -> _Bent:
@@ -235,10 +221,16 @@ class _Bent:
         tips = checks.array("tip_radii", direction.tip_radii, length=n)
         if direction.sphere_radius:
             sphere_radius(scene.sphere_radius, "sphere_radius")
-        moved, sphere = _moved(direction.positions, n), Ball.exact(direction.sphere_radius)
+        expected = f"({n}, 2) finite numbers: x and y of each asperity"
+        moved = checks.numbers("positions", direction.positions, expected)
+        if moved.shape not in ((), (n, 2)):
+            raise InputError("positions", found=f"shape {moved.shape}", expected=expected)
+        if not (np.abs(moved) <= checks.LARGEST).all():  # False for nan
+            raise InputError("positions", found="numbers that are not finite", expected=expected)
+        changes = heights, tips, np.broadcast_to(moved, (n, 2)), direction.sphere_radius
         modulus = Ball.exact(direction.contact_modulus) / scene.material.contact_modulus
         every = Geometry.of(problem, np.arange(n))
-        bent = every.bent(Ball.exact(heights), Ball.exact(tips), Ball.exact(moved), sphere)
+        bent = every.bent(*(Ball.exact(each) for each in changes))
         bent = bent._replace(local=bent.local - modulus * 2.0 / 3.0)
         which = problem.candidates
         here = Bending(*(each[which] for each in bent))
@@ -250,29 +242,13 @@ class _Bent:
         C is the diagonal matrix of indentations, and c_i is the local stiffness of asperity i. The
         second result is (n,) dA P + A dP - dd - dD0, the changes of gaps of open asperities.
         """
-        problem = level.problem
-        raised = self.here.offsets / problem.units.length - self._felt(level)
-        right = raised - level.indentation.positive_part() * self.here.local
-        moved = level.response(right, total)
-        return moved, product(level, moved.loads) - raised - moved.approach
-
-    def _felt(self, level: Level) -> Ball:
-        """(n,) dA P, the change of A P that is due to the change of A."""
-        change, points = Part(level).coupled * -self.modulus, self.here.points
+        felt, points = Part(level).coupled * -self.modulus, self.here.points  # dA P
         if points.value.any():
             every, P = np.arange(len(level.problem)), level.loads
             carried = [P, points[:, 0] * P, points[:, 1] * P]
             by_points, by_x, by_y = self.geometry.slopes(carried, every)
-            change = change + (points * by_points).sum() - by_x[:, 0] - by_y[:, 1]
-        return change
-
-
-def _moved(positions: ArrayLike, n: int) -> Array:
-    """(n, 2) checked changes of positions, from an array (n, 2) or from one number for all."""
-    expected = f"({n}, 2) finite numbers: x and y of each asperity"
-    moved = checks.numbers("positions", positions, expected)
-    if moved.shape not in ((), (n, 2)):
-        raise InputError("positions", found=f"shape {moved.shape}", expected=expected)
-    if not (np.abs(moved) <= checks.LARGEST).all():  # False for nan
-        raise InputError("positions", found="numbers that are not finite", expected=expected)
-    return np.broadcast_to(moved, (n, 2))
+            felt = felt + (points * by_points).sum() - by_x[:, 0] - by_y[:, 1]
+        raised = self.here.offsets / level.problem.units.length - felt
+        right = raised - level.indentation.positive_part() * self.here.local
+        moved = level.response(right, total)
+        return moved, product(level, moved.loads) - raised - moved.approach

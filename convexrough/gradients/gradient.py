@@ -19,8 +19,7 @@ from convexrough.arithmetic.balls import Ball, of_rows
 from convexrough.arrays import Array, among_zeros, frozen
 from convexrough.contact import Contact, levels_of
 from convexrough.errors import InputError
-from convexrough.gradients.parts import ZERO, Moves, Part
-from convexrough.gradients.scene import Bending, Geometry
+from convexrough.gradients.parts import ZERO, Bending, Geometry, Moves, Part
 from convexrough.normal.level import Level
 from convexrough.normal.levels import Levels
 from convexrough.plottable import Plottable
@@ -36,65 +35,49 @@ WHOLE = ("friction", "load", "approach", "force", "maximum", "minimum")
 
 @dataclass(frozen=True)
 class Number:
-    """A number J that depends on a contact, with its derivatives at constant forces and load.
+    """A number J that depends on a contact, with its derivatives at constant forces and load."""
 
-    top    : the level of the contact; its problem has n asperities that could touch (candidates)
-    value  : J
-    parts  : the parts of J that come from levels
-    slopes : derivatives of J by parameters at constant offsets d, coefficients k and matrix A
-    steep  : for each of these derivatives that is infinite, a number of the same sign
-    sides  : for "forces" or "loads" of a path, (m, 2) derivatives from below and from above
-    """
-
-    contact: Contact
-    top: Level
-    value: Ball
-    parts: Sequence[Part]
-    slopes: Mapping[str, Ball]
-    steep: Mapping[str, float]
-    sides: Mapping[str, Array] = field(default_factory=dict)
+    top: Level  # of the contact; n asperities could touch (candidates)
+    value: Ball  # J
+    parts: Sequence[Part]  # of J that come from levels
+    slopes: Moves  # derivatives of J at constant offsets d, coefficients k and matrix A
+    steep: Mapping[str, float]  # for infinite ones of them, numbers of the same sign
+    sides: Mapping[str, Array]  # for "forces" or "loads" of a path: (m, 2) from below and above
 
     @classmethod
     def of(
-        cls,
-        contact: Contact,
-        top: Level,
-        value: Ball,
-        parts: Sequence[Part],
-        explicit: Moves,
-        sides: Mapping[str, Array] | None = None,
+        cls, top: Level, value: Ball, parts: Sequence[Part], explicit: Moves, **sides: Array
     ) -> Number:
-        """The number with these parts.
-
-        explicit : derivatives by parameters at fixed levels
-        """
+        """The number with these parts; `explicit` has its derivatives at fixed levels."""
         slopes, steep = dict(explicit), dict[str, float]()
         for part in parts:
             for name, rate in part.moves.items():
                 slopes[name] = slopes.get(name, ZERO) + part.slopes.load * rate
                 if part.level.trial is None and part.weight.size > 0.0:
                     steep[name] = float((part.weight * rate).value)
-        return cls(contact, top, value, parts, slopes, steep, sides or {})
+        return cls(top, value, parts, slopes, steep, sides)
 
-    def times(self, factor: Ball, slopes: Mapping[str, Ball]) -> Number:
-        """The number times a factor; `slopes` are the number times derivatives of the factor."""
+    def times(self, factor: Ball, **slopes: Ball) -> Number:
+        """The number times a factor; `slopes` are the number times derivatives of the factor.
+
+        Only for numbers whose parts have no weights of P and n.
+        """
         both = {name: slope * factor for name, slope in self.slopes.items()}
         for name, slope in slopes.items():
             both[name] = both.get(name, ZERO) + slope
-        parts = [part.times(factor) for part in self.parts]
+        parts = [
+            replace(part, energy=factor * part.energy, approach=factor * part.approach)
+            for part in self.parts
+        ]
         return replace(self, value=self.value * factor, parts=parts, slopes=both)
 
     def holding_the_approach(self) -> Number:
-        """The number with derivatives at constant approach: dJ|D0 = dJ|P - (dJ/dP / S) dD0|P.
-
-        The bar names what is constant: the approach D0 or the load P. S is dD0/dP.
-        """
+        """The number with derivatives at constant approach: dJ|D0 = dJ|P - (dJ/dP / S) dD0|P."""
         slopes, units = dict(self.slopes), self.top.problem.units
         by_approach = slopes.pop("load", ZERO) * units.force / self.top.tangent.approach
         slopes["approach"] = by_approach / units.length
-        return replace(
-            self, parts=[*self.parts, Part(self.top, approach=-by_approach)], slopes=slopes
-        )
+        parts = [*self.parts, Part(self.top, approach=-by_approach)]
+        return replace(self, parts=parts, slopes=slopes)
 
     @cached_property
     def geometry(self) -> Geometry:
@@ -103,17 +86,17 @@ class Number:
     @cached_property
     def offsets(self) -> Ball:
         """(n,) derivatives by the offsets d."""
-        zero = Ball.exact(np.zeros(len(self.top.problem)))
-        return (
-            sum((part.slopes.offsets for part in self.parts), start=zero)
-            / self.top.problem.units.length
-        )
+        scaled = sum((part.slopes.offsets for part in self.parts), start=self._zero)
+        return scaled / self.top.problem.units.length
 
     @cached_property
     def local(self) -> Ball:
         """(n,) derivatives by log k."""
-        zero = Ball.exact(np.zeros(len(self.top.problem)))
-        return sum((part.slopes.local for part in self.parts), start=zero)
+        return sum((part.slopes.local for part in self.parts), start=self._zero)
+
+    @property
+    def _zero(self) -> Ball:
+        return Ball.exact(np.zeros(len(self.top.problem)))
 
     @cached_property
     def coupled(self) -> Ball:
@@ -124,10 +107,8 @@ class Number:
     def turning(self) -> Ball:
         """(n, 2) derivatives by the contact points c, on which A depends."""
         n, turned = len(self.offsets), [(part.slopes.left, part.level.loads) for part in self.parts]
-        carrying = np.zeros(n, dtype=bool)
-        for left, loads in turned:
-            carrying |= (left.size > 0) | (loads.size > 0)
-        which = np.flatnonzero(carrying)
+        sizes = [each.size for pair in turned for each in pair]
+        which = np.flatnonzero(sum(sizes, start=np.zeros(n)))
         total = Ball.exact(np.zeros((len(which), 2)))
         turned = [(left[which], loads[which]) for left, loads in turned if left.size.any()]
         slopes = iter(self.geometry.slopes([each for pair in turned for each in pair], which))
@@ -139,9 +120,8 @@ class Number:
     @cached_property
     def positions(self) -> Ball:
         """(n, 2) derivatives by the positions of the summits."""
-        geometry = self.geometry
-        sinking = self.offsets[:, None] * geometry.bend * geometry.points
-        return self.turning * geometry.share - sinking
+        sinking = self.offsets[:, None] * self.geometry.bend * self.geometry.points
+        return self.turning * self.geometry.share - sinking
 
     def along(self, by: Bending) -> Ball:
         """(n,) for each asperity, the derivative along the change `by` of its geometry."""
@@ -151,7 +131,7 @@ class Number:
     @property
     def whole(self) -> dict[str, Ball]:
         """The number, and its derivatives by parameters of the whole scene or state, by name."""
-        scene, slopes = self.contact.scene, self.slopes
+        scene, slopes = self.top.problem.scene, self.slopes
         modulus = (self.local.sum() * -2.0 / 3.0 - self.coupled) / scene.material.contact_modulus
         found = {"value": self.value, "poisson_ratio": slopes.get("poisson_ratio", ZERO)}
         found |= {name: slopes[name] for name in WHOLE if name in slopes}
@@ -163,11 +143,7 @@ class Number:
 
     @property
     def balance_defect(self) -> float:
-        """Relative error in the identity  E* dJ/dE* + sum of L dJ/dL = the terms of J with V and P.
-
-        If the modulus and all loads are multiplied by one factor, so are these terms
-        (`Part.scaled`).
-        """
+        """Relative error in the identity  E* dJ/dE* + sum of L dJ/dL = sum of `Part.scaled`."""
         bent = self.local.sum() * -2.0 / 3.0
         terms = [bent, -self.coupled, *(part.slopes.load * part.level.load for part in self.parts)]
         terms += [-sum((part.scaled for part in self.parts), start=ZERO)]
@@ -175,22 +151,16 @@ class Number:
         size = max(float(np.abs(term.value)) for term in terms)
         return abs(defect) / size if size > 0 else 0.0
 
-    def in_scene(self, values: Array) -> Array:
-        """(N, ...) the values (n, ...) of the candidates, with 0 for all other asperities."""
-        return frozen(self.top.problem.to_scene(values))
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Gradient(Table, Plottable):
     """Derivatives of one number with respect to a scene and the prescribed quantities.
 
-    docs/theory/gradients.md derives them.
-
     The unit of a derivative is the unit of the number over the unit of the parameter. Each
     derivative is at constant values of the other parameters named here. So shear forces Q are
-    constant, but the fractions Q / (f P) and the displacements are not. docs/theory/gradients.md,
-    "Derivatives at a prescribed approach or displacement", tells how to keep a displacement
-    constant.
+    constant, but the fractions Q / (f P) and the displacements are not. docs/theory/gradients.md
+    derives them; "Derivatives at a prescribed approach or displacement" there tells how to keep a
+    displacement constant.
 
     Attributes that end in `_error` or `_errors` are proved bounds on the errors of the derivatives,
     including all rounding, for the given float64 data of the scene. They are infinite if the
@@ -269,7 +239,7 @@ class Gradient(Table, Plottable):
     load_sides: Array | None = None
 
     @classmethod
-    def of(cls, number: Number, holding: Holding) -> Gradient:
+    def of(cls, contact: Contact, number: Number, holding: Holding) -> Gradient:
         """The gradient of a number, in the scene's units."""
         shown = number.holding_the_approach() if holding == "approach" else number
         found: dict[str, Any] = {}
@@ -282,29 +252,25 @@ class Gradient(Table, Plottable):
             found[name] = frozen(slopes.value.copy())
             found[f"{one}_errors"] = frozen(slopes.error.copy())
             found[f"{one}_sides"] = frozen(sides)
-        tips = shown.along(shown.geometry.by_tip)
-        return cls(
-            contact=shown.contact,
-            holding=holding,
-            heights=shown.in_scene(shown.offsets.value),
-            height_errors=shown.in_scene(shown.offsets.error),
-            tip_radii=shown.in_scene(tips.value),
-            tip_radius_errors=shown.in_scene(tips.error),
-            balance_defect=shown.balance_defect,
-            number=number,
-            shown=shown,
-            **found,
-        )
+        to_scene = shown.top.problem.to_scene
+        for name, one, each in (
+            ("heights", "height", shown.offsets),
+            ("tip_radii", "tip_radius", shown.along(shown.geometry.by_tip)),
+        ):
+            found[name] = frozen(to_scene(each.value))
+            found[f"{one}_errors"] = frozen(to_scene(each.error))
+        defect = shown.balance_defect
+        return cls(contact, holding, balance_defect=defect, number=number, shown=shown, **found)
 
     @cached_property
     def positions(self) -> Array:
         """(n, 2) derivatives by x and y, with zeros as in `heights`."""
-        return self.shown.in_scene(self.shown.positions.value)
+        return frozen(self.shown.top.problem.to_scene(self.shown.positions.value))
 
     @cached_property
     def position_errors(self) -> Array:
         """(n, 2) proved bounds on the errors of `positions`."""
-        return self.shown.in_scene(self.shown.positions.error)
+        return frozen(self.shown.top.problem.to_scene(self.shown.positions.error))
 
     @cached_property
     def normalised(self) -> Gradient:
@@ -331,14 +297,15 @@ class Gradient(Table, Plottable):
             whole = 1.0 / reference.energy_scale
             factor = Ball.around(whole, 1e-13 * whole)
         value = number.value * factor
-        slopes = {
-            "sphere_radius": value / (R * 3.0),
-            "contact_modulus": value * 2.0 / (E * 3.0),
-            "poisson_ratio": -value / ((1.0 - nu) * (2.0 - nu)),
-            "friction": value * -2.0 / f,
-            "load": value * -5.0 / (P * 3.0),
-        }
-        return Gradient.of(number.times(factor, slopes), self.holding)
+        normalised = number.times(
+            factor,
+            sphere_radius=value / (R * 3.0),
+            contact_modulus=value * 2.0 / (E * 3.0),
+            poisson_ratio=-value / ((1.0 - nu) * (2.0 - nu)),
+            friction=value * -2.0 / f,
+            load=value * -5.0 / (P * 3.0),
+        )
+        return Gradient.of(self.contact, normalised, self.holding)
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         """The printed rows, without parameters that are None."""

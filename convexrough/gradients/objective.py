@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -13,7 +14,7 @@ from numpy.typing import ArrayLike
 from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.contact import Contact, press
-from convexrough.errors import ExtraError, InputError
+from convexrough.errors import InputError, needed
 from convexrough.friction.shear import shear
 from convexrough.friction.steady import cycle
 from convexrough.gradients.gradient import Gradient, Holding
@@ -75,39 +76,35 @@ class Objective(Record):
         if self.of not in NUMBERS:
             expected = f"one of: {', '.join(NUMBERS)}"
             raise InputError("of", found=repr(self.of), expected=expected)
-        needed = NUMBERS[self.of]
-        if getattr(self, needed) is None:
-            raise InputError(needed, found="none", expected=f"a number, for the {self.of}")
-        if self.force is not None and needed != "force":
+        required = NUMBERS[self.of]
+        if getattr(self, required) is None:
+            raise InputError(required, found="none", expected=f"a number, for the {self.of}")
+        if self.force is not None and required != "force":
             expected = f"none, as the {self.of} does not depend on it"
             raise InputError("force", found=self.force, expected=expected)
         for name in PRESCRIBED:
             if (given := getattr(self, name)) is not None:
                 object.__setattr__(self, name, checks.finite(name, given))
-        by = (self.by,) if isinstance(self.by, str) else self._listed()
-        object.__setattr__(self, "by", by)
-        if "sphere_radius" in by:
-            sphere_radius(self.scene.sphere_radius, "by sphere_radius")
-        absent = [name for name in PRESCRIBED if getattr(self, name) is None]
-        if needed != "force" and self.scene.friction is None:
-            absent.append("friction")
-        able = [name for name in PARAMETERS if name not in absent]
-        for name in by:
-            if name not in able:
-                expected = f"some of: {', '.join(able)}"
-                raise InputError("by", found=repr(name), expected=expected)
-
-    def _listed(self) -> tuple[str, ...]:
-        """The names in `by`, after a check that there is at least one and none is repeated."""
+        by = (self.by,) if isinstance(self.by, str) else self.by
         try:
-            by = tuple(self.by)
+            by = tuple(by)
             once = 0 < len(by) == len(set(by))
         except TypeError:
             once = False
         if not once:
             expected = "a list of names of parameters, each once"
             raise InputError("by", found=repr(self.by)[:60], expected=expected)
-        return by
+        object.__setattr__(self, "by", by)
+        if "sphere_radius" in by:
+            sphere_radius(self.scene.sphere_radius, "by sphere_radius")
+        absent = [name for name in PRESCRIBED if getattr(self, name) is None]
+        if required != "force" and self.scene.friction is None:
+            absent.append("friction")
+        able = [name for name in PARAMETERS if name not in absent]
+        for name in by:
+            if name not in able:
+                expected = f"some of: {', '.join(able)}"
+                raise InputError("by", found=repr(name), expected=expected)
 
     @property
     def start(self) -> Array:
@@ -122,8 +119,10 @@ class Objective(Record):
         Raises InputError for invalid parameters, or if there is no gradient.
         """
         gradient = self.gradient(parameters)
-        slopes = [np.ravel(_slope(gradient, name)) for name in self.by]
-        return gradient.value, np.concatenate(slopes)
+        slopes = {name: getattr(gradient, name) for name in self.by}
+        if "force" in slopes and gradient.maximum is not None:
+            slopes["force"] = 2.0 * gradient.maximum  # the force also changes the minimum
+        return gradient.value, np.concatenate([np.ravel(each) for each in slopes.values()])
 
     def gradient(self, parameters: ArrayLike) -> Gradient:
         """The `Gradient` of the result at parameters (m,), with derivatives by all parameters.
@@ -134,15 +133,14 @@ class Objective(Record):
         >>> f"{force.gradient([4e-5]).approach:.4g}"
         '0.01089'
         """
-        own = [np.asarray(self._own(name)) for name in self.by]
-        ends = np.cumsum([each.size for each in own])
+        shapes = [np.shape(self._own(name)) for name in self.by]
+        ends = np.cumsum([math.prod(shape) for shape in shapes])
         vector = checks.array("parameters", parameters)
         if len(vector) != ends[-1]:
             expected = f"{ends[-1]}: {', '.join(self.by)}"
             raise InputError("parameters", found=f"{len(vector)} numbers", expected=expected)
-        parts = zip(np.split(vector, ends[:-1]), own, strict=True)
-        shaped = [part.reshape(each.shape) for part, each in parts]
-        given = dict(zip(self.by, shaped, strict=True))
+        parts = zip(self.by, np.split(vector, ends[:-1]), shapes, strict=True)
+        given = {name: part.reshape(shape) for name, part, shape in parts}
         load, approach, force = (
             None if (value := given.get(name, getattr(self, name))) is None else float(value)
             for name in PRESCRIBED
@@ -163,10 +161,7 @@ class Objective(Record):
         The result is computed outside of jax in float64. Without the option `jax_enable_x64`, value
         and gradient are rounded to float32. Raises ExtraError if jax is not installed.
         """
-        try:
-            import jax
-        except ImportError as error:
-            raise ExtraError("jax") from error
+        jax = needed("jax")
 
         def outside(x: Any) -> tuple[Any, Any]:
             value, slopes = self(np.asarray(x, dtype=np.float64))
@@ -188,13 +183,9 @@ class Objective(Record):
         The result is computed in float64 on the CPU, and rounded to the type of the argument.
         Raises ExtraError if torch is not installed.
         """
-        try:
-            import torch
-        except ImportError as error:
-            raise ExtraError("torch") from error
-        both = self
+        torch, both = needed("torch"), self
 
-        class Number(torch.autograd.Function):  # type: ignore[misc, name-defined, unused-ignore]
+        class Number(torch.autograd.Function):  # type: ignore[misc, name-defined]
             @staticmethod
             def forward(ctx: Any, x: Any) -> Any:
                 value, slopes = both(x.detach().cpu().numpy().astype(np.float64))
@@ -203,7 +194,7 @@ class Objective(Record):
                 return x.new_tensor(value)
 
             @staticmethod
-            @torch.autograd.function.once_differentiable  # type: ignore[untyped-decorator, unused-ignore]
+            @torch.autograd.function.once_differentiable  # type: ignore[untyped-decorator]
             def backward(ctx: Any, weight: Any) -> Any:
                 return weight * ctx.saved_tensors[0]
 
@@ -215,10 +206,7 @@ class Objective(Record):
 
         Raises ExtraError if autograd is not installed.
         """
-        try:
-            from autograd.extend import defvjp, primitive
-        except ImportError as error:
-            raise ExtraError("autograd") from error
+        extend = needed("autograd.extend", "autograd")
 
         @lru_cache(maxsize=1)  # the backward pass uses the gradient at the last point
         def at(point: bytes) -> tuple[float, Array]:
@@ -227,19 +215,17 @@ class Objective(Record):
         def both(x: Any) -> tuple[float, Array]:
             return at(np.asarray(x, dtype=np.float64).tobytes())
 
-        found: Callable[[Any], Any] = primitive(lambda x: both(x)[0])
-        defvjp(found, lambda value, x: lambda weight: weight * both(x)[1])
+        found: Callable[[Any], Any] = extend.primitive(lambda x: both(x)[0])
+        extend.defvjp(found, lambda value, x: lambda weight: weight * both(x)[1])
         return found
 
     def _own(self, name: str) -> Any:
         """The value of a parameter in `scene`, or the prescribed quantity of this name."""
+        scene = self.scene
         if name == "friction":
-            return checks.friction(self.scene.friction)
-        owner: Any = self if name in PRESCRIBED else self.scene
-        if name in EACH:
-            owner = self.scene.asperities
-        if name in ELASTIC:
-            owner = self.scene.material
+            return checks.friction(scene.friction)
+        owners = (scene.asperities, EACH), (scene.material, ELASTIC), (self, PRESCRIBED)
+        owner = next((owner for owner, names in owners if name in names), scene)
         return getattr(owner, name)
 
     def _scene(self, given: dict[str, Array]) -> Scene:
@@ -260,17 +246,5 @@ def gradient_of(
         return cycle(contact, maximum=force).gradient(holding=holding)
     if of == "displacement":
         return shear(contact, force=force).gradient(displacement=1.0, holding=holding)
-    if of == "approach":
-        return contact.gradient(approach=1.0, holding=holding)
-    return contact.gradient(load=1.0, holding=holding)
-
-
-def _slope(gradient: Gradient, name: str) -> Any:
-    """The derivative by a parameter.
-
-    The derivative of a loss by `force` is twice that by the cycle's maximum, because `force` also
-    changes the minimum.
-    """
-    if name == "force" and gradient.maximum is not None:
-        return 2.0 * gradient.maximum
-    return getattr(gradient, name)
+    weight: dict[str, Any] = {of: 1.0}  # of the approach or the load
+    return contact.gradient(**weight, holding=holding)

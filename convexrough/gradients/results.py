@@ -19,13 +19,12 @@ from numpy.typing import ArrayLike
 from convexrough import checks
 from convexrough.arithmetic import balls
 from convexrough.arithmetic.balls import Ball
-from convexrough.arrays import Array, Indices, among_zeros
+from convexrough.arrays import Array, among_zeros
 from convexrough.contact import Contact
 from convexrough.errors import InputError, ProofError
 from convexrough.friction.cycle import Cycle
 from convexrough.friction.levels import FrictionLevels
 from convexrough.friction.onset import indices, root
-from convexrough.friction.order import Order
 from convexrough.friction.path import LoadPath
 from convexrough.friction.shear import ShearState
 from convexrough.gradients.along import NONE, Along
@@ -66,12 +65,8 @@ def by_load(units: Units) -> Moves:
 
 
 def by_forces(known: FrictionLevels, height: Ball, /, **shares: float) -> Moves:
-    """Derivatives of the level L = P - T, with T = Q / f, by load, friction and forces.
-
-    shares : derivatives of Q with respect to forces, by the names of the forces
-    """
-    by_force = -1.0 / known.force_unit
-    rates = {name: by_force * share for name, share in shares.items()}
+    """Derivatives of the level L = P - T, T = Q / f; `shares` are those of Q by forces."""
+    rates = {name: -1.0 / known.force_unit * share for name, share in shares.items()}
     return {**by_load(known.units), "friction": height / known.coefficient, **rates}
 
 
@@ -99,19 +94,22 @@ def contact_gradient(
     top, (on_loads, on_gaps, D, P) = levels(contact).top, _checked(contact, weights)
     on_loads, units = on_loads + P, top.problem.units
     far = np.setdiff1d(np.flatnonzero(on_gaps), top.problem.candidates)
-    if len(far):
-        top = _wider(top, np.union1d(top.problem.candidates, far))
-    which, length = top.problem.candidates, units.length
-    gap_weights = _where_open(top, -on_gaps[which]) * length if on_gaps.any() else None
+    if len(far):  # they become candidates, which are open
+        assert top.trial is not None
+        which = np.union1d(top.problem.candidates, far)
+        places, known = np.searchsorted(which, top.problem.candidates), top.trial.loads.high
+        wider = top.problem.widened(which)
+        top = proved(wider, refined_loads(wider, among_zeros(known, places, len(which))))
+    which = top.problem.candidates
     part = Part(
         top,
-        approach=Ball.exact(D) * length,
+        approach=Ball.exact(D) * units.length,
         loads=Ball.exact(on_loads[which]) * units.force if on_loads.any() else None,
-        indentations=gap_weights,
+        indentations=_where_open(top, -on_gaps[which]) * units.length if on_gaps.any() else None,
         moves=by_load(units),
     )
     explicit = {} if contact.scene.friction is None else {"friction": ZERO}
-    return Gradient.of(Number.of(contact, top, part.value, [part], explicit), holding)
+    return Gradient.of(contact, Number.of(top, part.value, [part], explicit), holding)
 
 
 def state_gradient(
@@ -137,7 +135,7 @@ def state_gradient(
     moved = weight * (top.approach - low.approach) + slid.dot(low.indentation)
     borne = carried.dot(top.loads - low.loads)
     explicit = at_fixed_levels(known, displacement=moved, force=borne)
-    return Gradient.of(Number.of(contact, top, moved + borne, parts, explicit), holding)
+    return Gradient.of(contact, Number.of(top, moved + borne, parts, explicit), holding)
 
 
 def onset_gradient(contact: Contact, asperity: int, *, holding: Holding | None = None) -> Gradient:
@@ -179,13 +177,11 @@ def onset_gradient(contact: Contact, asperity: int, *, holding: Holding | None =
         said = f"{asperity}, which slides last, together with others"
         raise InputError("asperity", found=said, expected=expected)
     explicit = {"load": f, "friction": total / f}
-    return Gradient.of(Number.of(contact, top, total, parts, explicit), holding)
+    return Gradient.of(contact, Number.of(top, total, parts, explicit), holding)
 
 
 def _just_touching(known: Levels, place: int, near: Ball) -> tuple[Level, Ball]:
-    """The level at which the indentation n of a candidate is 0, and dn/dL at this level.
-
-    near : an estimate of the load L of this level
+    """The level, near a load, at which the indentation n of a candidate is 0; and dn/dL there.
 
     The load of the result is an interval that contains the root of n, and on which n increases.
     """
@@ -220,24 +216,24 @@ def cycle_gradient(cycle: Cycle, *, holding: Holding | None = None) -> Gradient:
         m = len(cycle.loads)
         first = [(k % m, Fraction(0), Fraction(0)) for k in range(m + 1)]
         again = [((k + 1) % m, Fraction(1), Fraction(0)) for k in range(m)]
-        loads = [Fraction(load) for load in cycle.loads.tolist()]
-        along = Along(known, Fraction(0), first + again, loads, cycle.heights)
-        return _gradient(contact, along, holding, paths=True, order=cycle.order)
+        points = zip(map(Fraction, cycle.loads.tolist()), cycle.heights, strict=True)
+        along = Along(known, Fraction(0), first + again, np.array([*points]))
+        return _gradient(contact, along, holding, paths=True, sharp=cycle.order == "proved")
     amplitude = (max(cycle.heights) - min(cycle.heights)) / 2
     top, low = known.top, level_below(known, "maximum", amplitude, holding)
     T, mean = top.load - low.load, (top.approach + low.approach) * 0.5
     weight = known.loss_unit * 8.0
-    along_T = weight * T * -0.5
     moves = by_forces(known, T, maximum=0.5, minimum=-0.5)
     parts = [
-        Part(top, energy=weight, approach=along_T, moves=by_load(known.units)),
-        Part(low, energy=-weight, approach=along_T, moves=moves),
+        Part(top, energy=weight, approach=weight * T * -0.5, moves=by_load(known.units)),
+        Part(low, energy=-weight, approach=weight * T * -0.5, moves=moves),
     ]
     W = weight * (top.energy - low.energy - T * mean)
     explicit = at_fixed_levels(known, loss=W)
     for name in ("maximum", "minimum", "friction"):  # dT = dP - dL
         explicit[name] = explicit.get(name, ZERO) + weight * mean * moves[name]
-    return Gradient.of(_loss(Number.of(contact, top, W, parts, explicit), cycle.order), holding)
+    number = Number.of(top, W, parts, explicit)
+    return Gradient.of(contact, number if cycle.order == "proved" else _loose(number), holding)
 
 
 def path_gradient(
@@ -259,21 +255,22 @@ def path_gradient(
     # A loss on one segment is part of all later losses.
     later = [*accumulate(map(Fraction, spent[::-1].tolist()))][::-1]
     steps = [(k, later[k], Fraction(far[k])) for k in range(m)]
-    loads, heights = zip(*((curve.load, curve.height) for curve in path.curves), strict=True)
-    along = Along(known, Fraction(path.start), steps, loads, heights)
+    points = np.array([(curve.load, curve.height) for curve in path.curves])
+    along = Along(known, Fraction(path.start), steps, points)
     if path.load_constant and any(curve.load == abs(curve.height) for curve in path.curves):
         expected = "forces below f P: in gross sliding a history has no derivative"
         raise InputError("forces", found="gross sliding", expected=expected)
-    order = path.order if spent.any() else "proved"
-    return _gradient(path.contact, along, holding, paths=not path.load_constant, order=order)
+    sharp = path.order == "proved" or not spent.any()
+    return _gradient(path.contact, along, holding, paths=not path.load_constant, sharp=sharp)
 
 
 def _gradient(
-    contact: Contact, along: Along, holding: Holding, *, paths: bool, order: Order
+    contact: Contact, along: Along, holding: Holding, *, paths: bool, sharp: bool
 ) -> Gradient:
     """The gradient of a weighted sum along a path.
 
     paths : True if the load varies: derivatives by the loads of all points are added
+    sharp : False for losses whose order is not proved
     """
     if paths and holding == "approach":
         expected = '"load", because the loads of all points are prescribed'
@@ -281,26 +278,22 @@ def _gradient(
     known = along.known
     lost, moved = along.parts({} if paths else by_load(known.units))
     loss, far = (sum((part.value for part in parts), start=ZERO) for parts in (lost, moved))
-    m, T, f = len(along.loads), along.heights, known.coefficient
-    nothing = [Fraction(0)] * m
-    each = [[Fraction(int(i == k)) for i in range(m)] for k in range(m)]
+    f, in_P, in_T = known.coefficient, *np.eye(2, dtype=object)
+    each = np.eye(len(along.points), dtype=object)[:, :, None]
     explicit, sides = at_fixed_levels(known, loss, far), {}
-    scaled, _ = along.slopes([(nothing, T)], 1.0 / f)
+    scaled, _ = along.slopes(along.points[None] * in_T, 1.0 / f)
     by_friction = explicit["friction"] - scaled[0]
     explicit["friction"] = NONE if np.isnan(scaled.value[0]) else by_friction
-    by_T = [(nothing, one) for one in each]
-    explicit["forces"], sides["forces"] = along.slopes(by_T, 1.0 / f)
+    explicit["forces"], sides["forces"] = along.slopes(each * in_T, 1.0 / f)
     if paths:
-        by_P = [(one, nothing) for one in each]
-        explicit["loads"], sides["loads"] = along.slopes(by_P, Ball.exact(1.0))
-    parts = [*lost, *moved]
-    number = Number.of(contact, known.top, loss + far, parts, explicit, sides)
-    return Gradient.of(_loss(number, order), holding)
+        explicit["loads"], sides["loads"] = along.slopes(each * in_P, Ball.exact(1.0))
+    number = Number.of(known.top, loss + far, [*lost, *moved], explicit, **sides)
+    return Gradient.of(contact, number if sharp else _loose(number), holding)
 
 
-def _loss(number: Number, order: Order) -> Number:
-    """The number, a sum with losses; with infinite error bounds if order is not proved."""
-    return number if order == "proved" else number.times(Ball.around(1.0, np.inf), {})
+def _loose(number: Number) -> Number:
+    """The number with infinite error bounds."""
+    return number.times(Ball.around(1.0, np.inf))
 
 
 def _where_open(level: Level, weights: Array) -> Ball:
@@ -314,22 +307,14 @@ def _where_open(level: Level, weights: Array) -> Ball:
     return balls.where(doubtful, Ball.between(low, high), known) if doubtful.any() else known
 
 
-def _wider(level: Level, which: Indices) -> Level:
-    """The same level with the asperities `which` as candidates; the new ones are open."""
-    problem = level.problem.widened(which)
-    assert level.trial is not None
-    places = np.searchsorted(which, level.problem.candidates)
-    state = refined_loads(problem, among_zeros(level.trial.loads.high, places, len(which)))
-    return proved(problem, state)
-
-
 def _checked(contact: Contact, weights: Mapping[str, Any]) -> Iterator[Any]:
     """The checked weights: numbers, or arrays (n,) for asperities; 0 in place of None."""
     if all(value is None for value in weights.values()):
         expected = "weights of at least one of these results"
         raise InputError(", ".join(weights), found="none", expected=expected)
-    for name, value in weights.items():
+    for name, given in weights.items():
+        value = 0.0 if given is None else given
         if name in ("load", "approach", "displacement"):
-            yield 0.0 if value is None else checks.finite(name, value)
+            yield checks.finite(name, value)
         else:
-            yield checks.array(name, 0.0 if value is None else value, length=len(contact.scene))
+            yield checks.array(name, value, length=len(contact.scene))

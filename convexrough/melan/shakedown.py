@@ -17,14 +17,13 @@ from convexrough import checks
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact, press
 from convexrough.errors import InputError
-from convexrough.frames import Variables
 from convexrough.friction.levels import FrictionLevels
 from convexrough.friction.onset import MOST_ONSETS, enclosed, last_to_touch
 from convexrough.friction.order import Order
 from convexrough.influence import Kind
 from convexrough.melan.program import solve
 from convexrough.plottable import Plottable
-from convexrough.record import Along, Table
+from convexrough.record import Along, Table, Variables
 from convexrough.roundoff import SAFETY
 from convexrough.scene.scene import Scene
 from convexrough.vector_shear.problem import FrictionProblem

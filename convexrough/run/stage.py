@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough import checks, frames, plots
+from convexrough import checks, plots
 from convexrough.contact import Contact
 from convexrough.plausibility import CUT_OFF, array_extent, at_the_rim
-from convexrough.record import Record, rows_of, singular
+from convexrough.record import Record, frame_of, rows_of, singular
 from convexrough.run.values import FileTable
 from convexrough.tabular.columns import aligned
 from convexrough.tabular.units import UnitNames
@@ -261,7 +261,7 @@ class Result(Record):
     def to_dataframe(self) -> pandas.DataFrame:
         """The first table as a pandas DataFrame. Raises InputError if there is none."""
         checks.some(self.name, self.found)
-        return frames.of_rows(next(iter(self.tables().values())))
+        return frame_of(next(iter(self.tables().values())))
 
 
 class Steps(Result):

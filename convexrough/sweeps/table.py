@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from convexrough import checks, frames
+from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.errors import InputError, needed
-from convexrough.record import Record, in_text
+from convexrough.record import Record, frame_of, in_text
 from convexrough.sweeps.batch import Columns
 from convexrough.sweeps.folder import Folder, open_folder
 
@@ -148,7 +148,7 @@ class SweepTable(Record):
         (then use `to_dask`).
         """
         attributes = {name: self.manifest[name] for name in ("sweep", "version", "source")}
-        return frames.of_rows(self.read(columns), **attributes)
+        return frame_of(self.read(columns), **attributes)
 
     def to_dask(self, columns: Sequence[str] | None = None) -> dask.dataframe.DataFrame:
         """A Dask data frame with some columns, by default all; parts are read when needed.
@@ -264,4 +264,4 @@ def _quantiles(values: Array, at: Sequence[float]) -> Array:
 
 
 def _frame(folder: Folder, names: Sequence[str], part: range) -> pandas.DataFrame:
-    return frames.of_rows(folder.read(part, names))
+    return frame_of(folder.read(part, names))

@@ -28,22 +28,15 @@ ROUNDED = 8 * ROUNDOFF
 
 
 class VectorBounds(NamedTuple):
-    """Proved bounds on the errors of a state, in scaled units; infinite without a proof.
+    """Proved bounds on the errors of a state, in scaled units; infinite without a proof."""
 
-    proved : False if nothing is proved
-    increments, slips : (n,) bounds on |q - q*| and |slip - slip*|
-    displacement_error : bound on |X - X*|;  excess : bound on the energy minus the least energy
-    sliding, partial : (n,) True where the asperity is proved to slide, and where it is proved not
-        to slide
-    """
-
-    proved: bool
-    increments: Array
-    slips: Array
-    displacement_error: float
-    sliding: NDArray[np.bool_]
-    partial: NDArray[np.bool_]
-    excess: float = np.inf
+    proved: bool  # False if nothing is proved
+    increments: Array  # (n,) bounds on |q - q*|
+    slips: Array  # (n,) bounds on |slip - slip*|
+    displacement_error: float  # bound on |X - X*|
+    sliding: NDArray[np.bool_]  # (n,) True where the asperity is proved to slide
+    partial: NDArray[np.bool_]  # (n,) True where it is proved not to slide
+    excess: float = np.inf  # bound on the energy minus the least energy
 
     @classmethod
     def unproved(cls, n: int) -> VectorBounds:
@@ -55,19 +48,26 @@ class VectorBounds(NamedTuple):
 @quietly
 def certify_vectors(problem: FrictionProblem, state: VectorState, total: Ball) -> VectorBounds:
     """Bounds on the errors of a state from any source; `total` is T (2,) as a ball."""
-    if problem.scope == "none" or not problem.sure.any():
-        return VectorBounds.unproved(len(problem))
     found = VectorBounds.unproved(len(problem))
+    if problem.scope == "none" or not problem.sure.any():
+        return found
     if np.isfinite(state.displacement).all() and problem.margin > 0:
         found = _by_convexity(problem, state, total)
     if not (found.sliding | found.partial).all():
-        found = _merged(found, _by_exhaustion(problem, state, total))
+        other = _by_exhaustion(problem, state, total)
+        found = VectorBounds(
+            found.proved or other.proved,
+            np.fmin(found.increments, other.increments),
+            np.fmin(found.slips, other.slips),
+            min(found.displacement_error, other.displacement_error),
+            found.sliding | other.sliding,
+            found.partial | other.partial,
+        )
     return found._replace(excess=_excess(problem, state, total, found.increments))
 
 
 def _by_convexity(problem: FrictionProblem, state: VectorState, total: Ball) -> VectorBounds:
-    sure, stiffness = problem.sure, problem.stiffness
-    reach = problem.reach
+    sure, stiffness, reach = problem.sure, problem.stiffness, problem.reach
     limits, thresholds = problem.load_balls, problem.threshold_balls
 
     # 1. The trial, its imbalance, and the error of its total.
@@ -100,9 +100,8 @@ def _by_convexity(problem: FrictionProblem, state: VectorState, total: Ball) -> 
 
     # 6. Statuses, and bounds for the given state.
     uncertainty = (turned + displacement_error) * (1 + SAFETY) + ROUNDED * size
-    distances = np.fmin(distances, _steepest(problem, size - uncertainty) * uncertainty) * (
-        1 + SAFETY
-    )
+    nearer = np.fmin(distances, _steepest(problem, size - uncertainty) * uncertainty)
+    distances = nearer * (1 + SAFETY)
     sliding = sure & (size - uncertainty > thresholds.upper)
     bears_more = np.hypot(*forces.T) * (1 + ROUNDED) + force_errors + distances < limits.lower
     partial = sure & ((size + uncertainty < thresholds.lower) | bears_more)
@@ -113,14 +112,8 @@ def _by_convexity(problem: FrictionProblem, state: VectorState, total: Ball) -> 
     slips = along(np.maximum(size - thresholds.value, 0.0), eta, size)
     slip_errors = np.hypot(*(slips - state.slips).T) + uncertainty + thresholds.error
     slip_errors = np.where(partial, np.hypot(*state.slips.T), np.where(sure, slip_errors, np.inf))
-    return VectorBounds(
-        bool(np.isfinite(displacement_error)),
-        increments,
-        slip_errors,
-        displacement_error,
-        sliding,
-        partial,
-    )
+    proved = bool(np.isfinite(displacement_error))
+    return VectorBounds(proved, increments, slip_errors, displacement_error, sliding, partial)
 
 
 def _forces(eta: Array, limits: Ball, thresholds: Ball) -> Ball:
@@ -168,10 +161,9 @@ def _shift(problem: FrictionProblem, eta: Array, turned: Array, missing: float) 
     if not slope > 0:
         return np.inf
     radius = missing / slope * (1 + 1e-9)
+    enough = missing * (1 + SAFETY)
     for _ in range(TRIALS):
-        if not np.isfinite(radius) or radius * least_slope(turned + radius) > missing * (
-            1 + SAFETY
-        ):
+        if not np.isfinite(radius) or radius * least_slope(turned + radius) > enough:
             return radius
         radius = radius * WIDER + 1e-300
     return np.inf
@@ -204,17 +196,6 @@ def _excess(problem: FrictionProblem, state: VectorState, total: Ball, errors: A
     return float(off @ moved + short.size.sum()) * (1 + SAFETY)
 
 
-def _merged(found: VectorBounds, other: VectorBounds) -> VectorBounds:
-    return VectorBounds(
-        found.proved or other.proved,
-        np.fmin(found.increments, other.increments),
-        np.fmin(found.slips, other.slips),
-        min(found.displacement_error, other.displacement_error),
-        found.sliding | other.sliding,
-        found.partial | other.partial,
-    )
-
-
 def _by_exhaustion(problem: FrictionProblem, state: VectorState, total: Ball) -> VectorBounds:
     """The bounds near gross sliding: docs/theory/vector-friction.md, "Close to gross sliding".
 
@@ -236,18 +217,14 @@ def _by_exhaustion(problem: FrictionProblem, state: VectorState, total: Ball) ->
 
     # B q is within `uncertainty` of `coupled`, its value at q = P t.
     coupled, across = problem.couple(P[:, None] * t), np.array([-t[1], t[0]])
-    uncertainty = reach @ np.where(sure, problem.errors, 0.0) + np.sqrt(
-        2.0 * unused * (reach**2 @ most)
-    )
+    uncertainty = reach @ np.where(sure, problem.errors, 0.0)
+    uncertainty = uncertainty + np.sqrt(2.0 * unused * (reach**2 @ most))
     uncertainty += (1.0 + problem.bias) * problem.stray_effect
     uncertainty += (problem.product_error + 2 * ROUNDED) * (reach @ P)
     least = np.where(sure, problem.load_balls.lower, np.inf)
     missing = unused / least
-    lowest = (
-        thresholds.lower * (1.0 - missing - missing ** (2 / 3) - ROUNDED)
-        + coupled @ t
-        - uncertainty
-    )
+    deflected = thresholds.lower * (1.0 - missing - missing ** (2 / 3) - ROUNDED)
+    lowest = deflected + coupled @ t - uncertainty
     least_displacement = lowest.max(where=sure & (missing < 1), initial=-np.inf)  # bounds X.t
     highest = thresholds.upper + uncertainty  # bounds |X - coupled| where an asperity sticks
     pushed = least_displacement - coupled @ t > highest * (1 + SAFETY)

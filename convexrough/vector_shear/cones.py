@@ -25,16 +25,13 @@ from convexrough.vector_shear.problem import FrictionProblem, VectorState, along
 class _Lift(NamedTuple):
     """Cones x y >= w^2 for one asperity, with x, y, w linear in k variables.
 
-    orders : (k,) order of each variable in u; the first variable is the number 1
-    cones  : (cones, 3, k) coefficients of x, y, w
-    share  : (k,) coefficients of m / P = 1 - t^3, where m is a bound on |q|
-    energy : (2, k) two rows; the first plus S times the second are coefficients of the local energy
+    The first plus S times the second row of `energy` are coefficients of the local energy.
     """
 
-    orders: Array
-    cones: Array
-    share: Array
-    energy: Array
+    orders: Array  # (k,) order of each variable in u; the first variable is the number 1
+    cones: Array  # (cones, 3, k) coefficients of x, y, w
+    share: Array  # (k,) coefficients of m / P = 1 - t^3, where m is a bound on |q|
+    energy: Array  # (2, k)
 
 
 #: The form with four cones, in the variables 1, (1 - t^2)^2, t^2 u, t^2 u^2, t^2 u^3, t^3 u^3.
@@ -136,8 +133,8 @@ class FrictionProgram:
     The variables are q / (epsilon P), in the order x_1, y_1, x_2, ..., then those of the cones,
     asperity by asperity.
 
-    total  : (2,) the total shear force T
-    lift   : the cones of an asperity;  small : (n,) epsilon;  energy : the unit of energy
+    total : (2,) the total shear force T;  lift : the cones of an asperity;  small : (n,) epsilon
+    energy, force : the units of energy and of the total
     """
 
     problem: FrictionProblem
@@ -145,22 +142,28 @@ class FrictionProgram:
     lift: _Lift
     small: Array
     energy: float
+    force: float
 
     @classmethod
     def assemble(cls, problem: FrictionProblem, total: Array) -> FrictionProgram:
         """The program for a total (2,). Raises SolverError if S exceeds the range of the cones."""
         if problem.share > FIVE_CONES_LIMIT:
-            raise _too_dense(problem)
+            touching, numbers = problem.touching, problem.convexity_numbers
+            worst = np.argsort(-numbers)[:5]
+            named = ", ".join(f"{touching[i]} ({numbers[i]:.4g})" for i in worst)
+            raise SolverError(
+                "asperities too dense for a convex program, which needs S <= 1: the kernel is "
+                f"convex from a shift S that is {problem.share:.4g} of the local compliance. "
+                "Largest convexity numbers (contact radii divided by pi/4 times the distance to "
+                f"the nearest neighbour), by asperity: {named}",
+                solver="friction (conic)",
+                advice="use a smaller load, sharper tips, or asperities further apart",
+            )
         elastic = np.hypot(*total) * problem.elastic.value / problem.loads
         small = np.clip(elastic, 0.01 * elastic.max(), 1.0)
         energy = float((problem.loads * problem.thresholds * small**2).max())
         lift = FOUR if problem.share <= FOUR_CONES_LIMIT else FIVE
-        return cls(problem, total, lift, small, energy)
-
-    @property
-    def force(self) -> float:
-        """The unit of the total in the program."""
-        return float(np.hypot(*self.total))
+        return cls(problem, total, lift, small, energy, float(np.hypot(*total)))
 
     def apply(self) -> ConeProgram:
         """The program in standard form: the objective, the prescribed total and all cones."""
@@ -185,10 +188,9 @@ class FrictionProgram:
         totals = sparse.hstack([balance, sparse.csc_matrix((2, more))])
         constraints = sparse.csc_matrix(sparse.vstack([totals, -cones]))
         constraints.eliminate_zeros()
+        quadratic = sparse.block_diag((upper, sparse.csc_matrix((more, more))))
         return ConeProgram(
-            quadratic=sparse.csc_matrix(
-                sparse.block_diag((upper, sparse.csc_matrix((more, more))))
-            ),
+            quadratic=sparse.csc_matrix(quadratic),
             linear=np.concatenate((np.zeros(2 * n), lifted.ravel())),
             constraints=constraints,
             constant=np.concatenate((self.total / self.force, rows[:, :, 0].ravel())),
@@ -227,17 +229,3 @@ class FrictionProgram:
         q = along(np.where(sliding, P, np.minimum(size, P)), q, size)
         slips = along(np.where(sliding, slip, 0.0), q, np.hypot(*q.T))
         return VectorState(self.total, q, displacement, slips, raw.iterations)
-
-
-def _too_dense(problem: FrictionProblem) -> SolverError:
-    touching, numbers = problem.touching, problem.convexity_numbers
-    worst = np.argsort(-numbers)[:5]
-    named = ", ".join(f"{touching[i]} ({numbers[i]:.4g})" for i in worst)
-    return SolverError(
-        f"asperities too dense for a convex program, which needs S <= 1: the kernel is convex from "
-        f"a shift S that is {problem.share:.4g} of the local compliance. Largest convexity numbers "
-        f"(contact radii divided by pi/4 times the distance to the nearest neighbour), by "
-        f"asperity: {named}",
-        solver="friction (conic)",
-        advice="use a smaller load, sharper tips, or asperities further apart",
-    )

@@ -57,15 +57,11 @@ class FrictionNewton:
         _, deflections = problem.from_rest(height)
         start = law.evaluate(deflections[:, None] * (total / size))
         if start is None:
-            raise SolverError(
-                "no forces of the prescribed total to start from",
-                solver=law.solver,
-                advice=advice(problem, size),
-            )
+            missing = "no forces of the prescribed total to start from"
+            raise SolverError(missing, solver=law.solver, advice=law.advice())
         state, iterations = newton.solve(law, start, self.tolerance, 0.0, self.max_iterations)
-        size_of = np.hypot(*state.unknown.T)
-        beyond = np.maximum(size_of - problem.thresholds, 0.0)
-        slips = along(beyond, state.unknown, size_of)
+        sizes = np.hypot(*state.unknown.T)
+        slips = along(np.maximum(sizes - problem.thresholds, 0.0), state.unknown, sizes)
         return VectorState(total, state.forces, state.at.displacement, slips, iterations)
 
 
@@ -120,47 +116,52 @@ class _Friction:
         )
 
     def direction(self, state: newton.Iterate, left: float) -> Array:
-        """The Newton step. The linear system is solved directly, so `left` is not used."""
-        return _direction(self.problem, state)
+        """The Newton step d(eta), solved directly, so that `left` is not used.
 
-    def advice(self, state: newton.Iterate) -> str:
-        return advice(self.problem, float(np.hypot(*self.total)))
+        If the matrix is not positive definite, a diagonal makes the kernel semidefinite.
+        """
+        from scipy.linalg.lapack import dpotrf, dpotrs  # 0.2 s to import: only when solving
 
-
-def _direction(problem: FrictionProblem, state: newton.Iterate) -> Array:
-    """The step d(eta).
-
-    If the matrix is not positive definite, the kernel gets a diagonal that makes it semidefinite.
-    """
-    from scipy.linalg.lapack import dpotrf, dpotrs  # 0.2 s to import: only when solving
-
-    n = len(problem)
-    roots = state.at.roots
-    scaled = problem.kernel
-    for _ in range(2):  # B W, then W'B W
-        scaled = np.einsum("rjc,jcb->rjb", scaled.reshape(2 * n, n, 2), roots)
-        scaled = scaled.reshape(2 * n, 2 * n).T
-    pushed = np.einsum("nij,ni->nj", roots, -state.defect)
-    turned = np.swapaxes(roots, 1, 2)  # W' for dX along x and along y
-    right = np.concatenate((pushed[:, :, None], turned), axis=2).reshape(2 * n, 3)
-    matrix = scaled + np.eye(2 * n)
-    factor, info = dpotrf(matrix.T, lower=1, clean=0)
-    if info != 0:
-        slopes = np.einsum("nij,nij->nj", roots, roots).reshape(-1)
-        matrix[np.diag_indices(2 * n)] += np.repeat(problem.share * problem.compliance, 2) * slopes
+        problem, n = self.problem, len(self.problem)
+        roots = state.at.roots
+        scaled = problem.kernel
+        for _ in range(2):  # B W, then W'B W
+            scaled = np.einsum("rjc,jcb->rjb", scaled.reshape(2 * n, n, 2), roots)
+            scaled = scaled.reshape(2 * n, 2 * n).T
+        pushed = np.einsum("nij,ni->nj", roots, -state.defect)
+        turned = np.swapaxes(roots, 1, 2)  # W' for dX along x and along y
+        right = np.concatenate((pushed[:, :, None], turned), axis=2).reshape(2 * n, 3)
+        matrix = scaled + np.eye(2 * n)
         factor, info = dpotrf(matrix.T, lower=1, clean=0)
-    if info != 0:
-        raise SolverError(
-            "the shifted matrix is not positive definite",
-            solver=_Friction.solver,
-            iterate=state.forces,
+        if info != 0:
+            slopes = np.einsum("nij,nij->nj", roots, roots).reshape(-1)
+            matrix[np.diag_indices(2 * n)] += (
+                np.repeat(problem.share * problem.compliance, 2) * slopes
+            )
+            factor, info = dpotrf(matrix.T, lower=1, clean=0)
+        if info != 0:
+            raise SolverError(
+                "the shifted matrix is not positive definite",
+                solver=self.solver,
+                iterate=state.forces,
+            )
+        solved = dpotrs(factor, right, lower=1)[0].reshape(n, 2, 3)
+        forces = np.einsum("nij,njk->nik", roots, solved)  # dq = W y
+        sums = forces.sum(axis=0)
+        change = np.linalg.lstsq(sums[:, 1:], -sums[:, 0], rcond=None)[0]  # dX, so that sum dq = 0
+        moved = problem.couple(forces[:, :, 0] + forces[:, :, 1:] @ change)
+        return np.asarray(change - state.defect - moved)
+
+    def advice(self, state: newton.Iterate | None = None) -> str:
+        """What the user can try if no state is found at this total."""
+        share = float(np.hypot(*self.total)) / float(self.problem.loads.sum())
+        place, number = f"the shear force is {share:.6g} f P", self.problem.convexity_numbers.max()
+        if number < 1:
+            return f"{place}; try a shear force a little smaller"
+        return (
+            f"{place}, in a contact so crowded that the energy need not be convex (convexity "
+            f"number {number:.3g}, convex below 1): use a smaller load, or sharper tips"
         )
-    solved = dpotrs(factor, right, lower=1)[0].reshape(n, 2, 3)
-    forces = np.einsum("nij,njk->nik", roots, solved)  # dq = W y
-    sums = forces.sum(axis=0)
-    change = np.linalg.lstsq(sums[:, 1:], -sums[:, 0], rcond=None)[0]  # dX, so that sum dq = 0
-    moved = problem.couple(forces[:, :, 0] + forces[:, :, 1:] @ change)
-    return np.asarray(change - state.defect - moved)
 
 
 def _roots(problem: FrictionProblem, eta: Array) -> Array:
@@ -202,15 +203,3 @@ def _onto_total(problem: FrictionProblem, eta: Array, total: Array) -> Array | N
         ):
             return np.asarray(eta + shift)
     return None
-
-
-def advice(problem: FrictionProblem, total: float) -> str:
-    """What the user can try if no state is found at this total."""
-    place = f"the shear force is {total / float(problem.loads.sum()):.6g} f P"
-    number = float(problem.convexity_numbers.max())
-    if number < 1:
-        return f"{place}; try a shear force a little smaller"
-    return (
-        f"{place}, in a contact so crowded that the energy need not be convex (convexity number "
-        f"{number:.3g}, convex below 1): use a smaller load, or sharper tips"
-    )

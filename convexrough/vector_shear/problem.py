@@ -45,15 +45,12 @@ ELASTIC = Fraction(1, 10**15)
 
 
 class VectorState(NamedTuple):
-    """A friction state of the n loaded asperities, in scaled units.
+    """A friction state of the n loaded asperities, in scaled units."""
 
-    total : (2,) T;  increments : (n, 2) q;  displacement : (2,) X;  slips : (n, 2) slip_i
-    """
-
-    total: Array
-    increments: Array
-    displacement: Array
-    slips: Array
+    total: Array  # (2,) T
+    increments: Array  # (n, 2) q
+    displacement: Array  # (2,) X
+    slips: Array  # (n, 2) slip_i
     iterations: int
 
 
@@ -62,12 +59,10 @@ class FrictionProblem:
 
     Arrays are (n,), in scaled units. Raises InputError without friction.
 
-    levels   : the `FrictionLevels` of the contact: solutions of the normal problem at loads up to
-        that of the contact
+    levels   : normal solutions at loads up to that of the contact
     scope    : scope of the contact's certificate; "none" without a proof
-    touching, places : indices of the loaded asperities in the scene, and in `levels.candidates`,
-        the asperities that may touch
-    loads, errors : P, and bounds on its errors;  most : upper bounds on P
+    touching, places : indices of the loaded asperities in the scene, and in `levels.candidates`
+    loads, errors, most : P, bounds on its errors, and upper bounds on P
     thresholds : k P^(2/3)
     compliance : h_i = (2/3) threshold_i / P_i; the Hessian of the local energy is at least h_i I
     sure     : True where proved to touch
@@ -76,6 +71,7 @@ class FrictionProblem:
     stray    : bound on the total load of all asperities not proved to touch or to be open
     stray_effect : bound on the displacement of any asperity by this load
     bias     : nu / (2 - nu)
+    force_unit, travel_unit : [force], [length] units of shear forces and tangential displacements
     """
 
     def __init__(self, contact: Contact) -> None:
@@ -102,6 +98,8 @@ class FrictionProblem:
         self.stray_effect = self.stray * largest if self.stray else 0.0
         nu = contact.scene.material.poisson_ratio
         self.bias = nu / (2.0 - nu)
+        self.force_unit = float(levels.force_unit.value)
+        self.travel_unit = float(levels.travel_unit.value)
 
     def __len__(self) -> int:
         return len(self.loads)
@@ -112,11 +110,6 @@ class FrictionProblem:
         scale = self.units.force / self.units.length
         scale /= np.pi * self._scene.material.contact_modulus
         return couple(self._scene, self.touching, scale, self._kind)
-
-    @cached_property
-    def shells(self) -> Array:
-        """(n,) a diagonal for which A + diag(shells) is positive semidefinite."""
-        return shells(self.influence)
 
     @cached_property
     def kernel(self) -> Array:
@@ -137,22 +130,8 @@ class FrictionProblem:
 
     @property
     def convexity_numbers(self) -> Array:
-        """(n,) a_i / ((pi/2) s_i), with the contact radii a_i.
-
-        s_i is half the distance to the nearest loaded asperity.
-        """
-        numbers: Array = self.shells / self.compliance
-        return numbers
-
-    @cached_property
-    def force_unit(self) -> float:
-        """[force] the unit of shear forces."""
-        return float(self.levels.force_unit.value)
-
-    @cached_property
-    def travel_unit(self) -> float:
-        """[length] the unit of tangential displacements."""
-        return float(self.levels.travel_unit.value)
+        """(n,) contact radii divided by pi/4 times the distance to the nearest loaded asperity."""
+        return np.asarray(shells(self.influence) / self.compliance)
 
     @property
     def elastic(self) -> Ball:
@@ -175,8 +154,7 @@ class FrictionProblem:
         """(n,) the deflections under the shear forces u = `increments`, 0 <= u <= P."""
         left = (self.loads - increments) / self.loads
         x = mindlin.width_between(increments / self.loads, left)
-        eta: Array = self.thresholds * mindlin.deflection_at(x)
-        return eta
+        return np.asarray(self.thresholds * mindlin.deflection_at(x))
 
     def to_scene(self, values: NDArray[Any]) -> NDArray[Any]:
         """(N, ...) these values, and 0 for all other asperities of the scene."""
@@ -190,30 +168,21 @@ class FrictionProblem:
 
     def couple(self, increments: Array) -> Array:
         """(n, 2) the displacements B q for the forces q = `increments`."""
-        product: Array = self.kernel @ increments.reshape(-1)
-        return product.reshape(-1, 2)
+        return np.asarray(self.kernel @ increments.reshape(-1)).reshape(-1, 2)
 
     def sizes(self, increments: Array) -> Array:
-        """(n,) |q_i|, set to P_i where the two differ by rounding only.
-
-        Near P_i small changes of q_i would change deflections much.
-        """
+        """(n,) |q_i|, set to P_i where they differ by rounding, as deflections are steep there."""
         size, P = np.hypot(*increments.T), self.loads
-        full: Array = np.where(size >= P * (1.0 - 8 * ROUNDOFF), P, size)
-        return full
+        return np.where(size >= P * (1.0 - 8 * ROUNDOFF), P, size)
 
-    def local_forces(self, deflections: Array) -> Array:
-        """(n, 2) the forces q(eta), with |q_i| = P_i where an asperity slides.
+    def local_forces(self, eta: Array) -> Array:
+        """(n, 2) the forces q(eta), with |q_i| = P_i where an asperity slides."""
+        _, across = self.slopes(eta)
+        return eta * across[:, None]
 
-        deflections : (n, 2) eta, the sums of deflection and slip
-        """
-        _, across = self.slopes(deflections)
-        return deflections * across[:, None]
-
-    def slopes(self, deflections: Array) -> tuple[Array, Array]:
+    def slopes(self, eta: Array) -> tuple[Array, Array]:
         """(n,) the eigenvalues of dq/deta along and across eta (n, 2)."""
-        sizes = np.hypot(*deflections.T)
-        return slopes(self.loads / self.thresholds, sizes / self.thresholds)
+        return slopes(self.loads / self.thresholds, np.hypot(*eta.T) / self.thresholds)
 
     def energy(self, increments: Array, coupling: Array) -> float:
         """The energy of forces q, given their coupling B q."""
@@ -239,12 +208,8 @@ class FrictionProblem:
         unused = slip_size * np.maximum(1.0 - size / P, 0.0)
         missing = float(np.hypot(*(q.sum(axis=0) - state.total)))
         travel, total = float(np.hypot(*state.displacement)), float(np.hypot(*state.total))
-        parts = (
-            float(np.max([imbalance, across, unused])) / (travel or 1.0),
-            float((np.hypot(*q.T) / P - 1.0).max()),
-            missing / (total or 1.0),
-        )
-        return max(parts)
+        wrong = float(np.max([imbalance, across, unused])) / (travel or 1.0)
+        return max(wrong, float((np.hypot(*q.T) / P - 1.0).max()), missing / (total or 1.0))
 
     @cached_property
     def share(self) -> float:
@@ -269,16 +234,14 @@ class FrictionProblem:
     @property
     def reach(self) -> Array:
         """(n, n) bounds on the norms of the B_ij: |B_ij v| <= reach_ij |v|."""
-        bound: Array = self.influence.matrix * ((1.0 + self.bias) * (1 + SAFETY))
-        return bound
+        return np.asarray(self.influence.matrix * ((1.0 + self.bias) * (1 + SAFETY)))
 
 
 def slopes(scale: Array, share: Array) -> tuple[Array, Array]:
-    """(n,) eigenvalues of dq/deta along and across eta.
+    """(n,) eigenvalues of dq/deta along and across eta; the second is |q| / |eta|.
 
-    The arguments are scale = P / threshold and share = |eta| / threshold. The force is
-    q = P [1 - z^(3/2)] eta / |eta| with z = max(1 - share, 0). The eigenvalue across eta is
-    |q| / |eta|.
+    The force is q = P [1 - z^(3/2)] eta / |eta| with z = max(1 - share, 0), scale = P / threshold
+    and share = |eta| / threshold.
     """
     left = np.maximum(1.0 - share, 0.0)
     root = np.sqrt(left)

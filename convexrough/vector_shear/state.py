@@ -121,30 +121,24 @@ def shear_vector(
         return _unmoved(contact, solver.name)
     problem = contact.cached(FrictionProblem)
     exact = Ball.exact(Q) / friction / problem.units.force
-    total = exact.value
     height = problem.levels.height(size)
     if size == 0.0:
         nothing = np.zeros((len(problem), 2))
         state = VectorState(np.zeros(2), nothing, np.zeros(2), nothing, 0)
     elif height == problem.levels.load:
-        state = _gross(problem, total)
+        state = _gross(problem, exact.value)
     else:
-        state = _solved(solver, problem, total)
-
+        state = _solved(solver, problem, exact.value)
     unit, travel = problem.force_unit, problem.travel_unit
-
-    def in_scene(values: Array, unit: float) -> Array:
-        return frozen(problem.to_scene(values * unit))
-
     known = certify_vectors(problem, state, exact)
     left = np.maximum(1.0 - problem.sizes(state.increments) / problem.loads, 0.0)
     return VectorShearState(
         contact=contact,
         force=frozen(Q),
         displacement=frozen(_times(state.displacement, travel)),
-        forces=in_scene(state.increments, unit),
-        slips=in_scene(state.slips, travel),
-        stick_radii=in_scene(contact.contact_radii[problem.touching] * np.cbrt(left), 1.0),
+        forces=frozen(problem.to_scene(state.increments * unit)),
+        slips=frozen(problem.to_scene(state.slips * travel)),
+        stick_radii=frozen(contact.contact_radii * problem.to_scene(np.cbrt(left))),
         disagreement=_disagreement(problem, state, height),
         residual=problem.residual(state),
         duality_gap=(known.excess + _rounding(problem, state)) * unit * travel,
@@ -162,9 +156,12 @@ def _solved(solver: FrictionSolver, problem: FrictionProblem, total: Array) -> V
         if error.iterate is not None and error.iterate.ndim == 2:
             error.iterate = problem.to_scene(error.iterate * problem.force_unit)
         raise
-    found = (state.increments, state.slips, state.displacement)
-    shapes = ((len(problem), 2), (len(problem), 2), (2,))
-    for what, values, shape in zip(("forces", "slips", "displacement"), found, shapes, strict=True):
+    pairs = len(problem), 2
+    for what, values, shape in (
+        ("forces", state.increments, pairs),
+        ("slips", state.slips, pairs),
+        ("displacement", state.displacement, (2,)),
+    ):
         if np.shape(values) != shape or not np.isfinite(values).all():
             raise SolverError(f"no {what} were found: not finite numbers", solver=solver.name)
     return state._replace(total=total)
@@ -186,18 +183,17 @@ def _gross(problem: FrictionProblem, total: Array) -> VectorState:
     If the components across T of the displacements B q by these forces q differ, forces tend to
     this state only as the displacement X along T goes to infinity.
     """
-    along_total = total / np.hypot(*total)
-    across_total = np.array([-along_total[1], along_total[0]])
-    P, thresholds = problem.loads, problem.thresholds
-    q = P[:, None] * along_total
+    t = total / np.hypot(*total)
+    across = np.array([-t[1], t[0]])
+    q = problem.loads[:, None] * t
     coupling = problem.couple(q)
-    least = thresholds + coupling @ along_total  # X at which each starts to slide
-    side = coupling @ across_total
-    alike = float(np.ptp(side)) <= 64 * ROUNDOFF * len(P) * float(least.max())
-    size = float(least.max()) if alike else np.inf
-    across = float(side.mean()) if alike else 0.0
-    displacement = _times(along_total, size) + across * across_total
-    slips = _times(np.broadcast_to(along_total, q.shape), (size - least)[:, None])
+    least, side = problem.thresholds + coupling @ t, coupling @ across
+    size = float(least.max())  # the X at which the last starts to slide
+    if float(np.ptp(side)) <= 64 * ROUNDOFF * len(q) * size:
+        displacement = t * size + float(side.mean()) * across
+    else:
+        size, displacement = np.inf, _times(t, np.inf)
+    slips = _times(np.broadcast_to(t, q.shape), (size - least)[:, None])
     return VectorState(total, q, displacement, slips, 0)
 
 
@@ -233,30 +229,24 @@ def _certificate(
         size = np.where(np.isfinite(values).all(axis=-1), np.hypot(*values.T), 0.0)
         return problem.to_scene((errors * (1 + SAFETY) + ROUNDED * size) * unit)
 
+    unit, travel, levels = problem.force_unit, problem.travel_unit, problem.levels
     displacement_error = float(bounds.displacement_error + ROUNDED * np.hypot(*state.displacement))
-    open_, n = contact.status == "open", len(contact.scene)
-    status = np.full(n, "undecided", dtype="<U12")
-    status[open_] = "open"
+    open_ = contact.status == "open"
+    status = np.where(open_, "open", np.full(len(open_), "undecided", dtype="<U12"))
     status[problem.to_scene(bounds.partial)] = "partial"
     status[problem.to_scene(bounds.sliding)] = "sliding"
     loaded = problem.to_scene(np.ones(len(problem), dtype=bool))
-    levels = problem.levels
-    off = levels.to_scene(np.asarray(levels.top.loads.error))
-    strays = np.where(loaded, 0.0, off * problem.force_unit)
+    strays = np.where(loaded, 0.0, levels.to_scene(np.asarray(levels.top.loads.error)) * unit)
+    unknown = np.where(loaded | open_, 0.0, np.inf)
     return ShearCertificate(
         scope=problem.scope if bounds.proved else "none",
         order="proved for one step",
         status=frozen(status),
-        force_errors=frozen(
-            strays + in_scene(bounds.increments, state.increments, problem.force_unit)
-        ),
-        slip_errors=frozen(
-            np.where(loaded | open_, 0.0, np.inf)
-            + in_scene(bounds.slips, state.slips, problem.travel_unit)
-        ),
+        force_errors=frozen(strays + in_scene(bounds.increments, state.increments, unit)),
+        slip_errors=frozen(unknown + in_scene(bounds.slips, state.slips, travel)),
         stick_radius_errors=frozen(np.where(open_, 0.0, np.inf)),
         force_error=0.0,
-        displacement_error=displacement_error * problem.travel_unit,
+        displacement_error=displacement_error * travel,
     )
 
 

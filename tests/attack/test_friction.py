@@ -109,7 +109,7 @@ def test_no_slip_of_what_does_not_touch() -> None:
     document = json.loads(json.dumps(contact.proof(sheared=[state]).document))
     radii = document["pressed"]["radii"]
     document["pressed"]["radii"] = [[float(f"{float.fromhex(r[0]):.4e}").hex()] for r in radii]
-    proved = checker.prove(document, lambda line: None)
+    proved = checker.prove(document)
     assert proved["status"][0] == "undecided"
     assert proved["shear"][0]["slips"][0].low == 0
 

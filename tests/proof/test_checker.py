@@ -51,10 +51,6 @@ def few() -> Any:
     return proof_of(*scenes.scattered(1, 6, 0.7, 0.3))
 
 
-def quiet(line: str) -> None:
-    """Progress is not shown."""
-
-
 def said(program: Path, path: Path, *options: str) -> tuple[int, str, str]:
     """Status and what the checker says of a file, in a process of its own."""
     command = [sys.executable, *options, str(program), str(path)]
@@ -143,7 +139,7 @@ def wrong(
     if sha256:
         document["sha256"] = checker.digest(document["scene"], document["prescribed"])
     with pytest.raises(error, match=reason):
-        checker.check(document, quiet)
+        checker.check(document)
 
 
 def test_scenes_that_are_too_large_impossible_or_of_another_hash_are_refused(document: Any) -> None:
@@ -179,7 +175,7 @@ def test_what_could_touch_may_be_held_open_where_it_is_proved_to_be() -> None:
     wrong(document, "claimed 'global', proved 'local'", argument__box__5=(0.0).hex())
     held = deepcopy(document)
     held["argument"]["box"][5], held["claims"]["scope"] = (0.0).hex(), "local"
-    assert checker.check(held, quiet).startswith("proved")
+    assert checker.check(held).startswith("proved")
 
     def pair(*which: int) -> cr.Scene:
         return scenes.on_sphere(np.array([[0.0, 0.0], [0.002, 0.0]])[[*which]])
@@ -265,7 +261,7 @@ def test_a_loss_is_claimed_in_order_alone() -> None:
     state = cr.shear(ordered, force=0.4 * 0.5 * ordered.load)
     weaker = json.loads(json.dumps(ordered.proof(sheared=[state]).document))
     weaker["claims"]["shear"][0] |= {"order": "proved for one step", "loss": None}
-    assert "(proved for one step)" in checker.check(weaker, print)
+    assert "(proved for one step)" in checker.check(weaker)
     wrong(document, "loss: claimed", claims__shear__0__loss=[(0.0).hex(), (1.0).hex()])
 
 
@@ -287,7 +283,7 @@ def test_shells_prove_what_eigenvalues_show() -> None:
         given_shells, given_radii = (list(map(Fraction, each.tolist())) for each in (shells, radii))
         try:
             everyone = list(range(8))
-            checker.prove_by_shells(read, given_shells, given_radii, everyone, quiet)
+            checker.prove_by_shells(read, given_shells, given_radii, everyone)
         except Refused:
             continue
         accepted += 1
@@ -338,7 +334,7 @@ def test_cholesky_finds_where_the_matrix_turns_indefinite() -> None:
     for factor, definite in ((0.5, True), (1 - 1e-12, True), (1 + 1e-12, False), (2, False)):
         given = [Fraction(float(radius * end * factor)) for radius in radii]
         try:
-            checker.prove_definite(read, given, list(range(12)), quiet)
+            checker.prove_definite(read, given, list(range(12)))
             assert definite
         except Refused:
             assert not definite
@@ -361,10 +357,10 @@ def test_two_solutions_are_both_proved_and_neither_is_the_only_one() -> None:
             "pressed": {"radii": [[first.hex()], [second.hex()]], "approach": [depth.hex()]},
         }
         document["sha256"] = checker.digest(document["scene"], document["prescribed"])
-        proved = checker.prove(document, quiet)
+        proved = checker.prove(document)
         assert proved["scope"] == "local"
         assert proved["status"] == ["contact" if x else "open" for x in (first, second)]
         wide = [(1.01 * a).hex()] * 2
         document["argument"] |= {"box": wide}
         with pytest.raises(Refused, match="breaks down"):
-            checker.prove(document, quiet)
+            checker.prove(document)

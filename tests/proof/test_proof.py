@@ -18,7 +18,7 @@ from convexrough.proof import prove
 def judged(proof: Any) -> Any:
     """The claims of a proof that the checker accepts and the oracle finds true."""
     document = json.loads(json.dumps(proof.document))
-    assert checker.check(document, lambda line: None) == proof.proved
+    assert checker.check(document) == proof.proved
     assert proof_oracle.false_claims(document) == []
     return document["claims"]
 
