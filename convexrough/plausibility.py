@@ -13,6 +13,7 @@ from convexrough.contact import Contact, covered, discs_of, mean_pressures
 from convexrough.scene.neighbours import crowding
 from convexrough.scene.scene import Scene
 from convexrough.sphere.smooth import SmoothEllipsoid, smooth_reference
+from convexrough.tabular.columns import bound
 from convexrough.tabular.units import UnitNames
 
 #: Contacts with fewer touching asperities than this cause a warning.
@@ -104,7 +105,7 @@ def wrong_loads(contact: Contact) -> Iterator[str]:
     loaded = int(((contact.loads > 0) & (proof.status == "open")).sum())
     far = proof.load_error > INACCURATE * largest and "contact" in proof.status
     if loaded or far:
-        off = f"{100 * proof.load_error / (largest or 1.0):.2g} % of the largest load"
+        off = f"{bound(100 * proof.load_error / (largest or 1.0), 2)} % of the largest load"
         yield (
             f"the loads err by up to {off}; asperities with a load that are proved open: "
             f"{loaded}; check the solver"
@@ -137,7 +138,7 @@ def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
             f"{HIGH_FRICTION:g}; it is a ratio, not in per cent"
         )
     if normal["contact"] == 0:
-        yield "no asperity carries a load: check the sign and the unit of the approach"
+        yield "no asperity carries a load: check the sign and unit of the approach, or the solver"
     elif normal["contact"] < FEW:
         yield (
             f"asperities in contact: {normal['contact']}, fewer than {FEW}: too few for a rough "

@@ -269,6 +269,11 @@ class Ones:  # the loads of a solver are judged as they are
         D = problem.approach or 1.0
         return Solution.of(problem, np.ones(len(problem)), D, 1, **self.refine)
 
+class Words(Ones):
+    name = "words"
+    def solve(self, problem, start=None):
+        return Solution.of(problem, ["1"] * len(problem), 1.0, 1)
+
 class Refined(Ones):
     refine = {"refine": True}
 
@@ -322,6 +327,8 @@ def test_a_solver_of_ones_own_by_its_name(
         assert re.search(said, wrong.err)
     short = command("compare", "scene.toml", "--solver", "desk_solvers.Short")
     assert "loads of shape (3,), expected (" in short.out
+    words = command("compare", "scene.toml", "--solver", "desk_solvers.Words")
+    assert "expected real numbers" in words.out
     profiled = command("gallery", "--profile", "few", "--solver", "desk_solvers.Mine", "--json")
     assert [each["solver"] for each in json.loads(profiled.out)["profile"]] == ["newton", "mine"]
     mine = json.loads(profiled.out)["profile"][1]

@@ -110,6 +110,12 @@ def test_what_is_right_holds() -> None:
     assert near.error < 1e-3
 
 
+def test_zero_loads_are_right_where_nothing_touches() -> None:
+    verdict = cr.verify(paper(), np.zeros(61), approach=-1e-5)
+    assert verdict.holds
+    assert verdict.error == 0.0
+
+
 def test_wrong_loads_do_not_pass_as_true() -> None:
     contact = cr.press(paper(), approach=PAPER_APPROACH)
     half = 0.5 * contact.loads

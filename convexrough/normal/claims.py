@@ -209,7 +209,8 @@ class Claim(ABC):
     @property
     def error(self) -> float:
         """The largest of `errors`, as a fraction of the largest force."""
-        return float(self.errors.max()) / self.largest if self.largest > 0 else np.inf
+        most = float(self.errors.max())
+        return most / self.largest if self.largest > 0 else 0.0 if most == 0 else np.inf
 
     @cached_property
     def off(self) -> Indices:

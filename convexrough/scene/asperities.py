@@ -222,7 +222,7 @@ def _points(positions: ArrayLike) -> Array:
         raise InputError("positions", found=found, expected="shape (n, 2): x and y of each")
     if not (good := (np.abs(points) <= checks.LARGEST).all(axis=1)).all():
         first = int(np.argmin(good))
-        found = str(points[first])
-        raise InputError(f"positions[{first}]", found=found, expected="finite numbers")
+        expected = f"numbers of size at most {checks.LARGEST:g}"
+        raise InputError(f"positions[{first}]", found=str(points[first]), expected=expected)
     points.flags.writeable = False
     return points

@@ -246,7 +246,7 @@ def _after_newton_step(
     raise SolverError(
         f"residual of {missed:.3g} of the approach after two Newton steps, accepted {ACCURATE:g}",
         solver=solver.name,
-        advice="try a smaller tolerance, or Newton's method",
+        advice="try more iterations, a smaller tolerance, or Newton's method",
         iterate=loads,
     )
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from convexrough.arrays import Array
 from convexrough.errors import SolverError
@@ -44,7 +45,7 @@ class Solution(Record):
     def of(
         cls,
         problem: NormalProblem,
-        loads: Array,
+        loads: ArrayLike,
         approach: float,
         iterations: int,
         *,
@@ -52,10 +53,13 @@ class Solution(Record):
     ) -> Solution:
         """A solution with the residual computed from the loads; inf if it is not a number.
 
-        Raises SolverError unless there is a load for each asperity of the problem.
+        Raises SolverError unless there is a real number for each asperity of the problem.
         """
-        if np.shape(loads) != (len(problem),):
-            raise SolverError(f"loads of shape {np.shape(loads)}, expected ({len(problem)},)")
+        loads = np.asarray(loads)
+        if loads.shape != (len(problem),):
+            raise SolverError(f"loads of shape {loads.shape}, expected ({len(problem)},)")
+        if loads.dtype.kind not in "iuf":
+            raise SolverError(f"loads of type {loads.dtype}, expected real numbers")
         residual = problem.residual(loads, approach)
         residual = np.inf if np.isnan(residual) else residual
         return cls(loads, approach, iterations, residual, refine)

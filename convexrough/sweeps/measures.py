@@ -78,7 +78,9 @@ def measured(contact: Contact, stages: Stages, wanted: Container[str]) -> Measur
     if ONSET in wanted:
         which = np.flatnonzero(contact.loads)
         onsets = onset_of_sliding(contact, which=which) / (limit(contact) or 1.0)
-        at = np.quantile(onsets, QUANTILES) if len(which) else np.full(len(QUANTILES), np.nan)
+        at = np.full(len(QUANTILES), np.nan)
+        if len(which):  # the least force at which this part slides
+            at = np.quantile(onsets, QUANTILES, method="inverted_cdf")
         found |= {(ONSET, f"{q:g}"): float(it) for q, it in zip(QUANTILES, at, strict=True)}
     return Measured(found, "; ".join(doubts), "; ".join(cautions))
 

@@ -78,8 +78,8 @@ assert abs(naive_loss(1e-6) / tiny.loss - 1) > 10
 # The repair
 # ----------
 #
-# Add up the losses of the asperities, none of which is negative: Mindlin's loss for an asperity in
-# partial slip, and :math:`4 f P_i s_i` for one that slides by :math:`s_i`. ``cycle`` does this.
+# Add up the losses of the asperities, none of which is negative: Mindlin's loss, to which an
+# asperity that slides by :math:`s_i` adds :math:`4 f P_i s_i`. ``cycle`` does this.
 # Its field ``balance_defect`` is the relative difference from the formula above, evaluated to
 # thirty digits; because of cancellation it can reach :math:`10^{-28} (f P / Q)^3`.
 

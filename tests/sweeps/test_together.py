@@ -8,6 +8,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from sweep_files import sweeping
 
+import convexrough as cr
 from convexrough.sweeps import batch, measures
 from convexrough.sweeps.batch import Columns, compute
 from convexrough.sweeps.plan import plan_of
@@ -44,6 +45,17 @@ def tables(changes: dict[str, Any], measure: list[str]) -> dict[str, Any]:
 def rows(changes: dict[str, Any], measure: list[str]) -> Columns:
     plan = plan_of(tables(changes, measure), Path("sweep"), None)
     return compute(plan.batch(range(plan.source.count)))[0]
+
+
+def test_onset_is_the_least_force_at_which_the_fraction_slides() -> None:
+    asperities = cr.Asperities([[0, 0], [1, 0], [0, 1], [-1, -1]], 0.1, [0.0, 2e-4, 3e-4, 5e-4])
+    scene = cr.Scene(np.inf, asperities, cr.Material(1.0, 0.3), friction=0.5)
+    contact = cr.press(scene, approach=1e-3)
+    onsets = np.sort(cr.onset_of_sliding(contact)[contact.loads > 0]) / (0.5 * contact.load)
+    found = measures.measured(contact, {}, ["onset"]).numbers
+    for quarters in range(1, 5):
+        least = onsets[-(-quarters * len(onsets) // 4) - 1]
+        assert_allclose(found["onset", f"{quarters / 4:g}"], least, rtol=1e-12)
 
 
 @pytest.mark.sample(2)

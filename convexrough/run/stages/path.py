@@ -23,9 +23,6 @@ from convexrough.run.values import Finite, Mistake, Phase, Positive, expected
 
 COUNTS = tuple(status for status in STATUSES if status != "contact")
 
-#: The largest relative error of a loss found in tests with n chords is this number / n^2.
-CHORDS_ERROR = 12
-
 
 class Ellipse(values.FileTable):
     """Chords of an elliptic path: normal load P + A cos t, shear force Q + B sin(t + phase).
@@ -85,9 +82,8 @@ class _Points(Stage):
         """A printed line about the chords that replace an ellipse; [] without an ellipse."""
         if self.ellipse is None:
             return []
-        n = self.ellipse.chords
-        more = f"larger, in our tests by a fraction of at most {CHORDS_ERROR / n**2:.1g}"
-        return [f"losses and errors are those of {n} chords; the loss along the ellipse is {more}"]
+        said = f"losses and errors are those of {self.ellipse.chords} chords; the loss along the "
+        return [f"{said}ellipse is larger: use twice as many chords to see by how much"]
 
 
 class PathStage(_Points):
