@@ -65,7 +65,7 @@ NEAR = 9  # where (7) proves (6) far away, (6) is computed for NEAR times as man
 SEARCHES = 15  # systems solved for weights; each leaves out earlier neighbours of negative weight
 SAMPLE = 300  # the linear program considers about twice as many asperities
 DIRECTIONS = 256  # directions in which the extent of the support is computed
-ROWS, NUMBERS = 2**14, 2**20  # asperities treated together, and float64 numbers in an array
+ROWS, NUMBERS = 2**14, 2**18  # asperities treated together, and float64 numbers in an array
 
 
 def swept_rates(influence: Influence, c: Array, rates: Array, spare: Array) -> Array:
