@@ -411,8 +411,13 @@ def _model_limits(problem: NormalProblem, solution: Solution, radii: Array) -> t
     if len(touching) < len(problem):
         A = A.restricted(touching)
     a = radii[touching]
-    moved = A.scale * A.falloff(solution.loads[touching] * a**2 / 10, 3)
+    moved = discs_as_points(A, solution.loads[touching], a)
     return float((moved / prescribed[touching]).max()), A.crowding(a)
+
+
+def discs_as_points(A: Influence, loads: Array, radii: Array) -> Array:
+    """(n,) upper bounds on the displacements by which point forces differ from discs."""
+    return A.scale * A.falloff(loads * radii**2 / 10, 3)
 
 
 def covered(scene: Scene, radii: Array) -> int:

@@ -15,21 +15,14 @@ OFF_GRID = 0.05
 
 
 class HeightGrid(NamedTuple):
-    """The heights in a file, and the pixel and units that the file states.
+    """The heights in a file, and what the file states about them."""
 
-    heights : nan where the file states no height; marks of holes such as -9999 are unchanged
-    pixel : size of a pixel along x and y; None if not stated
-    unit, height_unit : units of the pixel and of the heights; "" if not stated
-    comments : the comments that `read` does not understand
-    sheet : the name of the sheet of a workbook, in quotes; else ""
-    """
-
-    heights: Array
-    pixel: tuple[float, float] | None = None
-    unit: str = ""
+    heights: Array  # nan where the file states none; marks of holes such as -9999 are unchanged
+    pixel: tuple[float, float] | None = None  # along x and y
+    unit: str = ""  # of the pixel
     height_unit: str = ""
-    comments: tuple[str, ...] = ()
-    sheet: str = ""
+    comments: tuple[str, ...] = ()  # those that `read` does not understand
+    sheet: str = ""  # the name of the sheet of a workbook, in quotes
 
 
 def refuse_other(
@@ -40,8 +33,11 @@ def refuse_other(
         raise InputError("pixel", found=f"{said[0]:g} by {said[1]:g}", expected=expected)
 
 
-def placed(heights: Array, x: Array, y: Array) -> tuple[Array, tuple[float, float]]:
-    """The result of `on_grid`; x and y are those of columns and rows, or of each height."""
+def on_grid(heights: Array, x: Array, y: Array) -> tuple[Array, tuple[float, float]]:
+    """The map, with nan at missing points, and its pixel (dx, dy).
+
+    x, y : coordinates of each height in any order, or x of each column and y of each row
+    """
     vectors = heights.ndim > 1 and x.ndim == y.ndim == 1
     shape, y = ((len(y), len(x)), y[:, None]) if vectors else (x.shape, y)
     if heights.shape != shape or not (vectors or y.shape == shape):
@@ -49,29 +45,21 @@ def placed(heights: Array, x: Array, y: Array) -> tuple[Array, tuple[float, floa
         expected += ", as y and x require" if vectors or x.shape == y.shape else ", for y, too"
         expected += "; transpose it" if heights.T.shape == shape else ""
         raise InputError("heights", found=found, expected=expected)
-    return on_grid(x, y, heights)
-
-
-def on_grid(x: Array, y: Array, z: Array) -> tuple[Array, tuple[float, float]]:
-    """The map from heights z in any order, and the pixel (dx, dy); missing points are nan.
-
-    x, y : coordinates of each height, or x of each column (n,) and y of each row (m, 1)
-    """
     (column, dx), (row, dy) = steps("x", x), steps("y", y)
     shape = int(row.max()) + 1, int(column.max()) + 1
-    if math.prod(shape) > 4 * z.size + 100:
-        found = f"{z.size:,} points of a grid of {math.prod(shape):,}"
+    if math.prod(shape) > 4 * heights.size + 100:
+        found = f"{heights.size:,} points of a grid of {math.prod(shape):,}"
         raise InputError("x, y", found=found, expected="a regular grid")
     place = (row * shape[1] + column).ravel()
     count = np.bincount(place)
     if (most := count.max()) > 1:
-        k = np.unravel_index(int(np.argmax(count[place] == most)), z.shape)
-        at = [f"{np.broadcast_to(each, z.shape)[k]:g}" for each in (x, y)]
+        k = np.unravel_index(int(np.argmax(count[place] == most)), heights.shape)
+        at = [f"{np.broadcast_to(each, heights.shape)[k]:g}" for each in (x, y)]
         found = f"the point {', '.join(at)} {most} times"
         raise InputError("x, y", found=found, expected="each point once")
-    heights = np.full(shape, np.nan)
-    heights.ravel()[place] = z.ravel()
-    return heights, (dx, dy)
+    grid = np.full(shape, np.nan)
+    grid.ravel()[place] = heights.ravel()
+    return grid, (dx, dy)
 
 
 def steps(name: str, values: Array) -> tuple[Indices, float]:
@@ -83,9 +71,9 @@ def steps(name: str, values: Array) -> tuple[Indices, float]:
         raise InputError(name, found=found, expected="coordinates on a grid")
     clear = apart[apart > 1e-3 * apart.max()]  # smaller differences are rounding errors
     span = float(levels[-1] - levels[0])
-    digit = _last_digit(levels)
     # Lines of the grid can be missing. Rounded coordinates differ from the lines by less than one
     # unit of the last digit: half a unit from their own rounding, and half from that of the ends.
+    digit = _last_digit(levels)
     for count, rounded in ((np.rint(span / np.median(clear)), 0.0), (len(clear), digit)):
         step = span / count
         lines = (values - levels[0]) / step

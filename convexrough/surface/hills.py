@@ -16,29 +16,23 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 
 from convexrough.arrays import Array, Indices
 
-#: Steps (row, column) from a pixel to four of its eight neighbours: they find each pair of
-#: neighbours once.
+#: Steps (row, column) from a pixel to four of its eight neighbours: they find each pair once.
 PAIRS = ((0, 1), (1, 0), (1, 1), (1, -1))
 
 
 class Hills(NamedTuple):
-    """The maxima of a map, the tallest first.
+    """The maxima of a map, the tallest first."""
 
-    pixels      : (n, 2) row and column
-    prominences : (n,) [length] height above the highest pass to a taller maximum; for the tallest,
-        above the lowest pixel of the map
-    """
-
-    pixels: Indices
+    pixels: Indices  # (n, 2) row and column
+    #: (n,) [length] height above the highest pass to a taller maximum; of the tallest, above the
+    #: lowest pixel of the map
     prominences: Array
 
 
 def hills(heights: Array) -> Hills:
-    """The pixels that are higher than all eight neighbours, and their prominences.
-
-    Pixels of equal height are ordered by position. Maxima of prominence 0 are omitted, so that a
-    plateau has one maximum.
-    """
+    """The pixels that are higher than all eight neighbours, and their prominences."""
+    # Pixels of equal height are ordered by position. So all maxima of a plateau but one have the
+    # prominence 0, and are omitted.
     order = np.argsort(heights, axis=None, kind="stable")
     ranks: Indices = np.empty(heights.shape, dtype=np.intp)
     ranks.ravel()[order] = np.arange(heights.size)
@@ -63,11 +57,9 @@ def _ascents(ranks: NDArray[np.intp], order: Indices) -> tuple[Indices, Indices]
 
 
 def _passes(ranks: NDArray[np.intp], owners: Indices, count: int) -> Indices:
-    """(count,) rank of the highest pass from each maximum to a taller one; 0 for the tallest.
-
-    The passes are edges of the spanning tree of hills that Kruskal's algorithm builds from the
-    highest crossing down.
-    """
+    """(count,) rank of the highest pass from each maximum to a taller one; 0 for the tallest."""
+    # The passes are edges of the spanning tree that Kruskal's algorithm builds from the highest
+    # crossing down.
     crossings = [_crossings(ranks, owners, step) for step in PAIRS]
     first, second, rank = (np.concatenate(each) for each in zip(*crossings, strict=True))
     highest_first = np.lexsort((-rank, second, first))
@@ -98,10 +90,7 @@ def _passes(ranks: NDArray[np.intp], owners: Indices, count: int) -> Indices:
 def _crossings(
     ranks: NDArray[np.intp], owners: Indices, step: tuple[int, int]
 ) -> tuple[Indices, Indices, Indices]:
-    """For pairs of neighbouring pixels in different hills: both hills, and the lower rank.
-
-    The hill with the smaller number is first.
-    """
+    """For neighbouring pixels in different hills: the hills in order, and the lower rank."""
     (rows, columns), (down, right) = ranks.shape, step
     here = np.s_[: rows - down, max(0, -right) : columns - max(0, right)]
     there = np.s_[down:, max(0, right) : columns - max(0, -right)]

@@ -11,11 +11,7 @@ from convexrough.arrays import Array, Indices
 #: Steps (row, column) from a pixel to the four neighbours with which it shares a side.
 SIDES = ((0, 1), (1, 0), (0, -1), (-1, 0))
 
-#: Entries in a map of hole numbers: for a pixel that has a height, and outside of the map.
-KNOWN, OUTSIDE = -1, -2
-
-#: Least difference of the height of a spike from the median, divided by the standard deviation that
-#: is estimated from the quartiles.
+#: Standard deviations, estimated from the quartiles, by which a spike differs from the median.
 OUTLYING = 6.0
 
 #: Approximate number of pixels in the sample in which `repeated` counts heights.
@@ -23,12 +19,8 @@ SAMPLE = 2**17
 
 
 def spikes(heights: Array) -> Indices:
-    """(m, 2) row and column of outlying pixels that have at most one similar neighbour.
-
-    A pixel is outlying if its height differs from the median by more than OUTLYING standard
-    deviations. One of its eight neighbours is similar if the two heights differ by less than half
-    of the difference between pixel and median. Holes (nan) are neither outlying nor similar.
-    """
+    """(m, 2) row and column of outlying pixels of which at most one neighbour differs from them by
+    less than half of their difference from the median. Holes (nan) are neither."""
     low, middle, high = np.nanquantile(heights, (0.25, 0.5, 0.75))
     away = np.abs(heights - middle)
     found = np.argwhere(away > OUTLYING * (high - low) / 1.349)
@@ -41,11 +33,9 @@ def spikes(heights: Array) -> Indices:
 
 
 def clipped(heights: Array) -> int:
-    """The number of pixels with the largest height if they are surprisingly many, else 0.
+    """Number of pixels with the largest height if they are ten, and more than just below; else 0.
 
-    They are surprisingly many if they are at least ten, and more than the pixels just below. These
-    are lower than the largest height by at most 1 % of the range of heights; if there are none,
-    they are the pixels with the second largest height.
+    Just below are the pixels within 1 % of the range of heights, or those of the second largest.
     """
     top = heights.max()
     highest = int(np.count_nonzero(heights == top))
@@ -55,10 +45,8 @@ def clipped(heights: Array) -> int:
 
 
 def repeated(heights: Array) -> int:
-    """The number of pixels with the most frequent height if they are surprisingly many, else 0.
-
-    They are surprisingly many if, in a sample, they are at least 20, and 5 times as many as the
-    pixels of any other height. The largest height does not count: `clipped` treats it.
+    """The number of pixels with the most frequent height, below the largest, or 0 if it is not
+    surprising: in a sample at least 20 times, and 5 times as often as any other height.
     """
     sample = heights.ravel()[:: 1 + heights.size // SAMPLE]
     values, counts = np.unique(sample, return_counts=True)
@@ -70,16 +58,13 @@ def repeated(heights: Array) -> int:
 
 
 def copied(heights: Array) -> float:
-    """The fraction of rows that equal the row before, or the same of columns if that is larger.
+    """The fraction of rows, not flat, that equal the row before; or that of columns if larger."""
 
-    Rows and columns in which all heights are equal do not count.
-    """
-    return max(
-        float(((lines[1:] == lines[:-1]).all(axis=1) & (np.ptp(lines[1:], axis=1) > 0)).mean())
-        if len(lines) > 1
-        else 0.0
-        for lines in (heights, heights.T)
-    )
+    def part(lines: Array) -> float:
+        equal = (lines[1:] == lines[:-1]).all(axis=1) & (np.ptp(lines[1:], axis=1) > 0)
+        return float(equal.mean()) if len(equal) else 0.0
+
+    return max(part(heights), part(heights.T))
 
 
 def filled(heights: Array) -> Array:
@@ -90,14 +75,15 @@ def filled(heights: Array) -> Array:
     holes = np.isnan(heights)
     if (count := np.count_nonzero(holes)) == 0:
         return heights
-    number = np.full(heights.shape, KNOWN)
+    known, outside = -1, -2  # in the map of the numbers of holes
+    number = np.full(heights.shape, known)
     number[holes] = np.arange(count)
     around = (np.argwhere(holes)[:, None] + 1 + SIDES).T  # in the padded maps
-    neighbours = np.pad(number, 1, constant_values=OUTSIDE)[*around].T
+    neighbours = np.pad(number, 1, constant_values=outside)[*around].T
     sums = np.pad(np.where(holes, 0.0, heights), 1)[*around].sum(axis=0)
     row, side = np.nonzero(neighbours >= 0)
     between = coo_array((np.ones(len(row)), (row, neighbours[row, side])), shape=(count, count))
-    own = diags_array((neighbours != OUTSIDE).sum(axis=1, dtype=np.float64))
+    own = diags_array((neighbours != outside).sum(axis=1, dtype=np.float64))
     mended = heights.copy()
     symmetric = (own - between).tocsc()
     mended[holes] = spsolve(symmetric, sums, permc_spec="MMD_AT_PLUS_A")  # twice as fast

@@ -12,15 +12,13 @@ from numpy.typing import NDArray
 
 from convexrough.arrays import Array
 from convexrough.errors import FileError, InputError
-from convexrough.surface.height_grid import HeightGrid, placed, refuse_other
+from convexrough.surface.height_grid import HeightGrid, on_grid, refuse_other
 from convexrough.surface.surface import checked_pixel
 from convexrough.tabular.arrays import named_arrays
 
-#: Names that the array of heights may have in a file with several arrays.
+#: Names of arrays of an .npz or .mat file: of the heights; of the pixel and the units; and parts of
+#: names of other arrays that probably change the meaning of the heights, which are errors.
 HEIGHTS = ("heights", "height", "z")
-
-#: STATED: arrays of an .npz or .mat file that state the pixel and the units. SCALES: parts of names
-#: of other arrays that probably change the meaning of the heights; such arrays are errors.
 STATED = ("pixel", "unit", "height_unit")
 SCALES = re.compile(
     "unit|scale|factor|multipl|gain|offset|lsb|pixel|spacing|step|resol|calib|^d[xyz]$", re.I
@@ -35,13 +33,15 @@ def arrays_map(path: Path) -> HeightGrid:
     found = {name: np.asarray(values) for name, values in named_arrays(path).items()}
     named = {name.lower(): values for name, values in found.items()} | found
     chosen = "" if "" in found else _chosen(found)
-    others = [
-        name
-        for name, values in found.items()
-        if name != chosen
-        and name.lower() not in (*STATED, "x", "y")
-        and (SCALES.search(name) or _may_change(values, named[chosen]))
-    ]
+
+    def may_change(name: str, values: NDArray[Any]) -> bool:
+        """True for what may change the meaning of heights: a factor, a mask, coordinates."""
+        alike = values.size in (1, named[chosen].size, *named[chosen].shape)
+        numbers = values.dtype.kind in "biufc" and (alike or values.ndim > 1) and values.size > 0
+        return bool(SCALES.search(name)) or numbers
+
+    rest = {it: found[it] for it in found if it != chosen and it.lower() not in (*STATED, "x", "y")}
+    others = [name for name, values in rest.items() if may_change(name, values)]
     if others:
         expected = f"{', '.join(STATED)}, x, y and no other numbers beside heights, in which nan "
         expected += "marks holes"
@@ -56,16 +56,10 @@ def arrays_map(path: Path) -> HeightGrid:
     if not axes and heights.ndim == 2 and heights.shape[1] == 3:  # as in a text file
         *axes, heights = heights.T
     if axes:
-        heights, steps = placed(heights, *axes)
+        heights, steps = on_grid(heights, *axes)
         size = size or steps
         refuse_other(size, steps, ROUNDED, "the steps of x and y")
     return HeightGrid(heights, size, unit, height_unit)
-
-
-def _may_change(values: NDArray[Any], heights: NDArray[Any]) -> bool:
-    """True for numbers that may change the meaning of heights: a factor, a mask, coordinates."""
-    alike = values.size in (1, heights.size, *heights.shape)
-    return values.dtype.kind in "biufc" and (alike or values.ndim > 1) and values.size > 0
 
 
 def _chosen(found: dict[str, NDArray[Any]]) -> str:
@@ -90,9 +84,6 @@ def instrument_map(path: Path, pixel: float | tuple[float, float] | None) -> Hei
     """The heights of the default channel of a file that SurfaceTopography can read.
 
     pixel : size of a pixel, used if the file does not state the size of the map
-
-    Raises FileError if SurfaceTopography cannot read the file or is not installed; InputError if
-    the file contains no map of heights.
     """
     try:
         with catch_warnings(action="ignore", category=ImportWarning):  # MPI is optional

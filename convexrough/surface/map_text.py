@@ -45,12 +45,7 @@ MOST_COLUMNS = 6
 
 
 def text_map(path: Path) -> HeightGrid:
-    """The map in a text file.
-
-    A file with three columns or with names of columns is read as x, y and height, any other file as
-    a matrix. Raises FileError if the file is not text; InputError, with row and column, if it
-    contains no map.
-    """
+    """The map in a text file: x, y and height if it has three columns or names; else a matrix."""
     known = ("x", "y", "height", *COLUMNS["height"].also)
     table = read_text_table(path, known, _COMMENT, is_map=True)
     width = len(table.rows[0].cells) if table.rows else 0
@@ -68,14 +63,19 @@ def states_scale(comment: str) -> bool:
     unit = parsed(length[2] if length else value.strip())
     if marked and unit and unit.kind == "length":
         return True
-    if any(not (unit := parsed(each)) or unit.kind == "length" for each in in_text(comment)):
-        return True
-    return bool(_CHANGED.search(comment) or (re.search(r"\d", comment) and _SCALE.search(comment)))
+    named = map(parsed, in_text(comment))
+    scaled = _CHANGED.search(comment) or (re.search(r"\d", comment) and _SCALE.search(comment))
+    return bool(scaled) or any(not unit or unit.kind == "length" for unit in named)
 
 
 def _matrix(path: Path, table: TextTable, width: int) -> HeightGrid:
     """The matrix of heights, with the pixel size and the units that the comments state."""
-    _refuse_gaps([row.number for row in table.rows])
+    rows = [row.number for row in table.rows]
+    apart = np.diff(rows)
+    if len(gaps := np.flatnonzero(apart > min(apart, default=1))):  # as between two maps
+        found = f"lines without numbers between rows {rows[gaps[0]]} and {rows[gaps[0] + 1]}"
+        expected = "one map in a file: remove comments and empty lines between its rows"
+        raise InputError("rows", found=found, expected=expected)
     heights = matrix(path, table)
     for one, other in combinations(heights.T if width <= MOST_COLUMNS else (), 2):
         sides = [len(np.unique(each)) for each in (one, other)]
@@ -92,17 +92,22 @@ def _matrix(path: Path, table: TextTable, width: int) -> HeightGrid:
             if (np.abs(off) < 0.01 * spread).all():
                 found = f"the means of the {'columns' if place == 'row' else 'rows'}"
                 raise InputError(f"last {place}", found=found, expected="heights alone")
-    return _said(table.comments, heights)
-
-
-def _refuse_gaps(rows: Sequence[int]) -> None:
-    """Raise InputError if lines without numbers interrupt the rows, as between two maps."""
-    apart = np.diff(rows)
-    if len(gaps := np.flatnonzero(apart > min(apart, default=1))):
-        before, after = rows[gaps[0]], rows[gaps[0] + 1]
-        found = f"lines without numbers between rows {before} and {after}"
-        expected = "one map in a file: remove comments and empty lines between its rows"
-        raise InputError("rows", found=found, expected=expected)
+    said = {}
+    for match in filter(None, map(_SAID.fullmatch, table.comments)):
+        said[match[1].lower().rstrip("s")] = match[2]
+    sizes = [_LENGTH.fullmatch(said.get(name, "")) for name in ("width", "height")]
+    value_unit = said.get("value unit", "")
+    if sizes == [None, None]:
+        return HeightGrid(heights, height_unit=value_unit)
+    if None in sizes:
+        only = "only a width" if sizes[0] else "only a height"
+        raise InputError("comments", found=only, expected="a width and a height, or neither")
+    (across, unit_x), (upwards, unit_y) = (size.groups() for size in sizes if size)
+    if unit_x != unit_y:
+        raise InputError("units", found=f"{unit_x} and {unit_y}", expected="one along x and y")
+    lengths = [float(each.replace(",", ".")) for each in (across, upwards)]
+    dy, dx = np.divide(lengths[::-1], heights.shape).tolist()
+    return HeightGrid(heights, (dx, dy), unit_x, value_unit)
 
 
 def _not_heights(place: str, line: Sequence[Any] | Array) -> InputError:
@@ -121,31 +126,10 @@ def _even(line: Array) -> bool:
     )
 
 
-def _said(comments: Sequence[str], heights: Array) -> HeightGrid:
-    """The matrix `heights`, with the pixel size and the units that the comments state."""
-    said = {}
-    for found in filter(None, map(_SAID.fullmatch, comments)):
-        said[found[1].lower().rstrip("s")] = found[2]
-    sizes = [_LENGTH.fullmatch(said.get(name, "")) for name in ("width", "height")]
-    value_unit = said.get("value unit", "")
-    if sizes == [None, None]:
-        return HeightGrid(heights, height_unit=value_unit)
-    if None in sizes:
-        only = "only a width" if sizes[0] else "only a height"
-        raise InputError("comments", found=only, expected="a width and a height, or neither")
-    (width, unit_x), (height, unit_y) = (size.groups() for size in sizes if size)
-    if unit_x != unit_y:
-        raise InputError("units", found=f"{unit_x} and {unit_y}", expected="one along x and y")
-    rows, columns = heights.shape
-    across, upwards = (float(each.replace(",", ".")) for each in (width, height))
-    return HeightGrid(heights, (across / columns, upwards / rows), unit_x, value_unit)
-
-
 def _list(path: Path, cells: TextTable, width: int) -> HeightGrid:
     """The map from columns x, y and height, in any order; missing points of the grid are holes.
 
-    Other columns are an error unless `_is_label` is true, because they could be a mask or a factor
-    of the heights.
+    Other columns, which could be a mask or a factor of the heights, may only be labels.
     """
     names, number = cells.header.cells if cells.header else [], cells.style.number
     if names and all(number(name.replace(",", ".")) is not None for name in names):
@@ -164,7 +148,7 @@ def _list(path: Path, cells: TextTable, width: int) -> HeightGrid:
     if units[0] != units[1]:
         found = f"{units[0] or 'none'} and {units[1] or 'none'}"
         raise InputError("units", found=found, expected="one along x and y")
-    return HeightGrid(*on_grid(x, y, z), units[0], units[2])
+    return HeightGrid(*on_grid(z, x, y), units[0], units[2])
 
 
 def _is_label(name: str, cells: NDArray[Any]) -> bool:

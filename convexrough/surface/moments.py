@@ -62,10 +62,7 @@ class Moments(Record):
 
 
 def moments_of(heights: Array, pixel: tuple[float, float]) -> Moments:
-    """The moments of a map of heights, from differences of neighbouring pixels.
-
-    Differences underestimate slopes and curvatures of waves that are only a few pixels long.
-    """
+    """The moments of a map, from differences of neighbours, too small for waves of a few pixels."""
     across = [(1, pixel[0]), (0, pixel[1])]
     slopes = [np.mean((np.diff(heights, axis=axis) / step) ** 2) for axis, step in across]
     bends = [np.mean((np.diff(heights, 2, axis=axis) / step**2) ** 2) for axis, step in across]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from convexrough.arrays import Array
 from convexrough.errors import InputError, blamed_on
 from convexrough.surface.detrend import Trend
-from convexrough.surface.height_grid import HeightGrid, refuse_other
+from convexrough.surface.height_grid import refuse_other
 from convexrough.surface.holes import filled
 from convexrough.surface.map_arrays import arrays_map, instrument_map
 from convexrough.surface.map_text import states_scale, text_map
@@ -70,7 +70,14 @@ def read(
     (160.0, 160.0)
     """
     with blamed_on(path, unless_known=True):
-        grid = _grid(Path(path), pixel)
+        path = Path(path)
+        kind = path.suffix.lower()
+        with reading(path):
+            if kind in TEXT:
+                grid = text_map(path)
+            else:
+                is_known = kind in (".npy", ".npz", ".mat")
+                grid = arrays_map(path) if is_known else instrument_map(path, pixel)
         unclear = next(filter(states_scale, grid.comments), "")
         if unclear and not ((pixel or grid.pixel) and (height_unit or grid.height_unit)):
             expected = '"Width: 50 µm", "Height: 50 µm" and "Value units: nm" above a matrix, '
@@ -89,7 +96,12 @@ def read(
             heights = filled(heights)
         elif holes is not None:  # `detrend` fills them
             heights = np.where(holes, heights[~holes][0], heights)
-        size = _pixel(grid.pixel, pixel)
+        if (stated := pixel if grid.pixel is None else grid.pixel) is None:
+            expected = "its size, which the file does not state: pixel=, or --pixel"
+            raise InputError("pixel", found="none", expected=expected)
+        size = checked_pixel(stated)
+        given = size if pixel is None else checked_pixel(pixel)
+        refuse_other(given, size, SAME, "as the file states, or none given")
         name = length.name if length else ""
         source = f"{path}, sheet {grid.sheet}" if grid.sheet else str(path)
         surface = Surface(heights, size, name, (), holes, source, grid.comments)
@@ -104,27 +116,8 @@ def read(
         return surface
 
 
-def _pixel(
-    found: tuple[float, float] | None, given: float | tuple[float, float] | None
-) -> tuple[float, float]:
-    """The pixel that the file states or, if the file states none, the given pixel.
-
-    Raises InputError if the two differ, or if both are missing.
-    """
-    if (known := found if given is None else given) is None:
-        expected = "its size, which the file does not state: pixel=, or --pixel"
-        raise InputError("pixel", found="none", expected=expected)
-    said = checked_pixel(known)
-    there = said if found is None else checked_pixel(found)
-    refuse_other(said, there, SAME, "as the file states, or none given")
-    return there
-
-
 def _unfilled(heights: Array, fill: bool) -> tuple[Array, NDArray[np.bool_] | None]:
-    """The heights with nan in holes, and a map of the holes (None if there are no holes).
-
-    Raises InputError if all pixels are holes; for any holes if `fill` is false.
-    """
+    """The heights with nan in holes, which are errors unless `fill`; and a map of them, or None."""
     if heights.size == 0:
         return heights, None  # `Surface` refuses it
     known = np.isin(heights, MARKS) | (np.abs(heights) >= HUGE)
@@ -148,11 +141,3 @@ def _unfilled(heights: Array, fill: bool) -> tuple[Array, NDArray[np.bool_] | No
     if not fill:
         raise InputError("heights", found=found, expected="none, or fill=True, --fill to fill them")
     return heights, empty
-
-
-def _grid(path: Path, pixel: float | tuple[float, float] | None) -> HeightGrid:
-    kind = path.suffix.lower()
-    with reading(path):
-        if kind in TEXT:
-            return text_map(path)
-        return arrays_map(path) if kind in (".npy", ".npz", ".mat") else instrument_map(path, pixel)

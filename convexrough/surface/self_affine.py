@@ -84,10 +84,8 @@ def _waves(
     pixel: float,
     cutoff: float | None,
 ) -> tuple[Indices, Array]:
-    """The waves of a map, one for each pair of opposite wave vectors.
-
-    The result is (n, 2) the numbers of wavelengths in the map along x and y, and (n,) the variances
-    [length^2]. The order of the waves does not depend on the number of pixels.
+    """The waves of a map, one for each pair of opposite wave vectors, in an order independent of
+    `pixels`: (n, 2) numbers of wavelengths along x and y, and (n,) variances [length^2].
     """
     hurst = checks.between("hurst", hurst, 0.0, 1.0)
     rms_slope = checks.positive("rms_slope", rms_slope)

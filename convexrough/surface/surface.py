@@ -26,12 +26,10 @@ from convexrough.tabular.units import known_unit
 #: Largest ratio of the sides of a pixel; longer pixels do not resolve summits.
 MOST_ASPECT = 10.0
 
-#: A form that explains more than the fraction MOST of the variance of heights causes a warning. For
-#: this check it is fitted to at most FITTED pixels along a side.
-MOST, FITTED = 0.5, 256
-
-#: A paraboloid counts as round if its curvatures differ by less than this part of their mean.
-ROUND = 0.1
+#: A form, fitted to at most FITTED pixels along a side, causes a warning if it explains more than
+#: the fraction MOST of the variance of heights. A paraboloid whose curvatures differ by less than
+#: ROUND times their mean counts as a sphere.
+MOST, FITTED, ROUND = 0.5, 256, 0.1
 
 #: Smallest and largest rms slopes without a warning. Lapped steel has about 1e-2, polished wafers
 #: have 1e-3 to 1e-4.
@@ -265,8 +263,8 @@ class Surface(Record, Plottable):
         scale = own.into(into)
         removed = tuple(each.scaled(scale) for each in self.removed)
         dx, dy = self.pixel
-        return replace(self, heights=self.heights * scale, pixel=(dx * scale, dy * scale),
-                       unit=into.name, removed=removed)  # fmt: skip
+        heights, pixel = self.heights * scale, (dx * scale, dy * scale)
+        return replace(self, heights=heights, pixel=pixel, unit=into.name, removed=removed)
 
     @property
     def checksum(self) -> int:
@@ -296,10 +294,8 @@ class Surface(Record, Plottable):
         if fit % 2 == 0:
             raise InputError("fit", found=fit, expected="an odd number of pixels, at least 3")
         if min(shape) < fit:
-            found = f"{columns} by {rows} pixels"
-            raise InputError(
-                "map", found=found, expected=f"at least {fit} by {fit}, as fit is {fit}"
-            )
+            expected = f"at least {fit} by {fit}, as fit is {fit}"
+            raise InputError("map", found=f"{columns} by {rows} pixels", expected=expected)
         pixels, reach = self.hills.pixels, fit // 2
         prominent = self.hills.prominences >= prune * self.max_height
         inside = ((pixels >= reach) & (pixels < (rows - reach, columns - reach))).all(axis=1)
