@@ -23,27 +23,25 @@ DONE, UNHEARD, WRONG_INPUT, NOT_CERTIFIED, SOLVER_FAILED, INTERRUPTED = 0, 1, 2,
 
 PATH = click.Path(path_type=Path)
 
-#: Formats of figures.
-FORMATS = ("png", "svg", "pdf")
 
-
-def _formats(given: str) -> tuple[str, ...]:
-    formats = tuple(dict.fromkeys(each.strip().lower() for each in given.split(",")))
-    if unknown := [each for each in formats if each not in FORMATS]:
-        raise click.BadParameter(f"found {unknown[0]!r}, expected {', '.join(FORMATS)}")
+def _formats(*given: Any) -> tuple[str, ...]:
+    """The value of --formats as a tuple: `given` is a context, an option and its text."""
+    formats = tuple(dict.fromkeys(each.strip().lower() for each in given[-1].split(",")))
+    if unknown := [each for each in formats if each not in ("png", "svg", "pdf")]:
+        raise click.BadParameter(f"found {unknown[0]!r}, expected png, svg, pdf")
     return formats
 
 
-def _from_here(given: tuple[str, ...]) -> tuple[str, ...]:
+def _from_here(*given: Any) -> Any:
     """The solvers of --solver. This call makes modules of the current folder importable."""
-    if given and "" not in sys.path:
+    if given[-1] and "" not in sys.path:
         sys.path.insert(0, "")
-    return given
+    return given[-1]
 
 
 solver_option = click.option(
     "--solver", "solvers", metavar="NAME", multiple=True,
-    callback=lambda *given: _from_here(given[-1]),
+    callback=_from_here,
     help="A solver of the package, or the import path of your class, such as mine.Solver; may be "
     "repeated.",
 )  # fmt: skip
@@ -56,7 +54,7 @@ OPTIONS = {
         "--html", is_flag=True, help="Also write slider.html, an interactive page."),
     "formats": click.option(
         "--formats", metavar="LIST", default="png", show_default=True,
-        callback=lambda *given: _formats(given[-1]), help="Formats of figures: png, svg, pdf."),
+        callback=_formats, help="Formats of figures: png, svg, pdf."),
     "dpi": click.option(
         "--dpi", type=click.IntRange(50, 600), default=200, show_default=True,
         help="Pixels per inch of figures."),
@@ -132,10 +130,7 @@ class Output:
         return DONE if all(result.certified for result in results) else NOT_CERTIFIED
 
     def proved(self, work: Callable[[], Proof], folder: Path) -> Proof | None:
-        """The proof, also written to `folder`; None without --proof.
-
-        If there is no proof, the result is None, and a warning states the reason.
-        """
+        """The proof, also written to `folder`; None, with a warning, if there is none."""
         if not self.proof:
             return None
         try:
@@ -166,10 +161,7 @@ def say_aside(*parts: str) -> None:
 
 @contextmanager
 def progress(message: str) -> Iterator[None]:
-    """Show a status line while the body of `with` runs, if standard error is a terminal.
-
-    The line also shows the records of the logger `convexrough`.
-    """
+    """Show a line on a terminal, with records of our logger, while the body of `with` runs."""
     if not sys.stderr.isatty():
         yield
         return
