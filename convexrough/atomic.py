@@ -25,11 +25,8 @@ def unfinished(path: Path) -> Path:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A context manager that yields a temporary path, to which the body writes a file.
-
-    If the body succeeds, the temporary file replaces `path`; otherwise it is removed. It remains if
-    the process is killed. Raises FileError if `path` cannot be written.
-    """
+    """A context manager: the body writes to the path it gets, which then replaces `path`. A file
+    that is not complete is removed, except if the process is killed."""
     temporary = unfinished(path)
     try:
         with file_errors(path, "be written"):

@@ -237,13 +237,9 @@ def press_many(
         proof = one.certificate
         errors = proof.load_errors.sum() + n * ROUNDOFF * one.load  # and the rounding of the sum
         own = one.load, errors * (1 + SAFETY), one.approach, proof.approach_error
-        for total, value in zip(TOTALS, own, strict=True):
-            fields[total][k] = value
-        fields["asperity_loads"][k], fields["asperity_load_errors"][k] = (
-            one.loads,
-            proof.load_errors,
-        )
-        fields["status"][k] = proof.status
+        arrays = one.loads, proof.load_errors, proof.status
+        for values, value in zip(fields.values(), (*own, *arrays), strict=True):
+            values[k] = value
     contacts = Contacts(
         scenes=scenes,
         by_load=by_load,

@@ -129,9 +129,8 @@ def assert_agree(
             for each in (first, second)
         )
         if given != wanted:
-            raise InputError(
-                "second", found=f"prescribed {given}", expected=f"{wanted}, as in the first"
-            )
+            expected = f"{wanted}, as in the first"
+            raise InputError("second", found=f"prescribed {given}", expected=expected)
     for answer in (one, other):
         _check_proof(answer.certificate, f" of {answer.name}")
     if found := contradictions(one, other):
@@ -140,10 +139,8 @@ def assert_agree(
     largest = min(float(one.loads.max()), float(other.loads.max()))
     far = np.flatnonzero(apart > within * largest)
     if len(far):
-        each = (
-            f"{i}: {one.loads[i]:.6g} and {other.loads[i]:.6g}"
-            for i in far[np.argsort(-apart[far])]
-        )
+        worst = far[np.argsort(-apart[far])]
+        each = (f"{i}: {one.loads[i]:.6g} and {other.loads[i]:.6g}" for i in worst)
         part = apart.max() / largest if largest > 0 else np.inf
         raise AssertionError(
             f"{one.name} and {other.name}: loads differ by {part:.2g} of the largest, expected "

@@ -19,11 +19,8 @@ from convexrough.record import rows_of
 from convexrough.scene.scene import Scene
 from convexrough.tabular.columns import aligned, bound, labelled
 
-#: Relative errors above this are printed in per cent.
-PERCENT = 1e-4
-
-#: A list on the terminal shows at most this number of asperities, and says how many more there are.
-MOST_LISTED = 10
+#: Relative errors above PERCENT are printed in per cent; lists have at most MOST_LISTED asperities.
+PERCENT, MOST_LISTED = 1e-4, 10
 
 
 def verdict_summary(claims: Sequence[Claim]) -> dict[str, Any]:
@@ -32,18 +29,13 @@ def verdict_summary(claims: Sequence[Claim]) -> dict[str, Any]:
     for key, claim in zip(("verdict", "shear_verdict"), claims, strict=False):
         names = ("holds", *claim.kinds, "undecided", "off", "suspects", "error", "total_given",
                  "total_prescribed", "within")  # fmt: skip
-        found = {name: getattr(claim, name) for name in names}
-        summary[key] = {
-            name: it.tolist() if isinstance(it, np.ndarray) else it for name, it in found.items()
-        }
+        found = ((name, getattr(claim, name)) for name in names)
+        summary[key] = {name: it.tolist() if np.ndim(it) else it for name, it in found}
     return summary | {"asperities": rows_of(asperity_columns(claims))}
 
 
 def asperity_columns(claims: Sequence[Claim]) -> dict[str, NDArray[Any]]:
-    """Columns by name, with an entry for each asperity: what is claimed, and what is proved.
-
-    claims : the claim about loads and, if shear forces are checked, the claim about shear forces
-    """
+    """Columns by name, with what is claimed, and what is proved, about each asperity."""
     loads, *sheared = claims
     x, y = loads.of.asperities.positions.T
     columns = {"index": np.arange(len(x)), "x": x, "y": y, **_columns(loads)}
@@ -86,10 +78,7 @@ def _size(claim: Claim) -> str:
 
 
 def describe_claim(claim: Claim, others: str = "") -> list[str]:
-    """Aligned lines about one claim: wrong and undecided statuses, errors, the total, suspects.
-
-    others : text printed after the number of rows that a table leaves out
-    """
+    """Aligned lines about a claim; `others` follows the number of rows that a table leaves out."""
 
     def table(which: Indices) -> list[str]:
         lines = _table(claim, which[:MOST_LISTED])
@@ -126,10 +115,7 @@ def reason(claim: Claim) -> str:
 
 
 def junit(found: Sequence[Claim] | ConvexroughError, files: str) -> bytes:
-    """JUnit XML with a test case for each check of each claim, or with one case for an error.
-
-    files : names of the files that were checked, for the names of the test suite and its cases
-    """
+    """JUnit XML about `files`, with a case for each check of each claim, or one for an error."""
     suite = ElementTree.Element("testsuite", name=f"convexrough verify {files}")
     if isinstance(found, ConvexroughError):
         kind, cases = "error", {"input": str(found)}
@@ -145,8 +131,7 @@ def junit(found: Sequence[Claim] | ConvexroughError, files: str) -> bytes:
         suite.set(f"{each}s", str(len(suite.findall(f"*/{each}"))))
     root = ElementTree.Element("testsuites")
     root.append(suite)
-    written: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
-    return written
+    return bytes(ElementTree.tostring(root, encoding="utf-8", xml_declaration=True))
 
 
 def _findings(claim: Claim) -> dict[str, str]:
