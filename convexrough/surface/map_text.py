@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 from convexrough.arrays import Array
 from convexrough.errors import InputError
-from convexrough.surface.height_grid import HeightGrid, on_grid
-from convexrough.surface.map_arrays import SCALES
+from convexrough.surface.map_arrays import SCALES, HeightGrid, on_grid
 from convexrough.tabular.roles import COLUMNS, Reading, is_index
 from convexrough.tabular.table import matrix, read_table
 from convexrough.tabular.text import COMMENT, TextTable, read_text_table

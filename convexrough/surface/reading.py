@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from convexrough.arrays import Array
 from convexrough.errors import InputError, blamed_on
 from convexrough.surface.detrend import Trend
-from convexrough.surface.height_grid import refuse_other
-from convexrough.surface.holes import filled
-from convexrough.surface.map_arrays import arrays_map, instrument_map
+from convexrough.surface.map_arrays import arrays_map, instrument_map, refuse_other
 from convexrough.surface.map_text import states_scale, text_map
+from convexrough.surface.pixels import filled
 from convexrough.surface.surface import Surface, checked_pixel
 from convexrough.tabular.arrays import reading
 from convexrough.tabular.text import WORKBOOKS

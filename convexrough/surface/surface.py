@@ -16,9 +16,8 @@ from convexrough.arrays import Array, frozen
 from convexrough.errors import InputError
 from convexrough.plottable import Plottable
 from convexrough.record import Record
-from convexrough.surface import holes
+from convexrough.surface import pixels
 from convexrough.surface.detrend import TRENDS, Removed, Trend, fitted
-from convexrough.surface.hills import Hills, hills
 from convexrough.surface.moments import Moments, moments_of
 from convexrough.surface.summits import Origin, Summits, fit_tips
 from convexrough.tabular.units import known_unit
@@ -114,9 +113,9 @@ class Surface(Record, Plottable):
             filled_pixels=filled_pixels,
             source=source,
             comments=comments,
-            clipped=holes.clipped(known) if clipped is None else clipped,
-            repeated=holes.repeated(known) if repeated is None else repeated,
-            copied=holes.copied(measured) if copied is None else copied,
+            clipped=pixels.clipped(known) if clipped is None else clipped,
+            repeated=pixels.repeated(known) if repeated is None else repeated,
+            copied=pixels.copied(measured) if copied is None else copied,
         )
 
     @property
@@ -158,9 +157,9 @@ class Surface(Record, Plottable):
         return moments_of(self.heights, self.pixel)
 
     @cached_property
-    def hills(self) -> Hills:
+    def hills(self) -> pixels.Hills:
         """All maxima and their prominences."""
-        return hills(self.heights)
+        return pixels.hills(self.heights)
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
@@ -219,7 +218,7 @@ class Surface(Record, Plottable):
                 f"rms slope {self.rms_slope:.3g}: surfaces {rare} are rare; check the units of the "
                 "heights and of the pixel"
             )
-        if len(places := holes.spikes(self._measured)):
+        if len(places := pixels.spikes(self._measured)):
             row, column = places[0] + 1
             yield (
                 f"spikes or drop-outs: {len(places):,} pixels far from their neighbours, the first "
@@ -242,7 +241,7 @@ class Surface(Record, Plottable):
             expected = '"plane", "sphere" or "paraboloid"'
             raise InputError("detrend", found=repr(kind), expected=expected)
         trend, there = fitted(self._measured, self.pixel, kind)
-        left = holes.filled(self.heights - there)
+        left = pixels.filled(self.heights - there)
         if np.ptp(left) <= ROUNDING * float(np.abs(self.heights).max()):
             raise InputError("heights", found=f"nothing but a {kind}", expected="a rough surface")
         return replace(self, heights=left, removed=(*self.removed, trend))
@@ -296,10 +295,10 @@ class Surface(Record, Plottable):
         if min(shape) < fit:
             expected = f"at least {fit} by {fit}, as fit is {fit}"
             raise InputError("map", found=f"{columns} by {rows} pixels", expected=expected)
-        pixels, reach = self.hills.pixels, fit // 2
+        maxima, reach = self.hills.pixels, fit // 2
         prominent = self.hills.prominences >= prune * self.max_height
-        inside = ((pixels >= reach) & (pixels < (rows - reach, columns - reach))).all(axis=1)
-        tried = pixels[prominent & inside]
+        inside = ((maxima >= reach) & (maxima < (rows - reach, columns - reach))).all(axis=1)
+        tried = maxima[prominent & inside]
         tips = fit_tips(self.heights, tried, self.pixel, fit)
         origin = Origin(
             source=self.source,
@@ -314,7 +313,7 @@ class Surface(Record, Plottable):
             moments=self.moments,
             prune=prune,
             fit=int(fit),
-            maxima=len(pixels),
+            maxima=len(maxima),
             pruned=int(np.count_nonzero(~prominent)),
             at_edge=int(np.count_nonzero(prominent & ~inside)),
             without_top=int(np.count_nonzero(~tips.whole)),

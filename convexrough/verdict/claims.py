@@ -21,7 +21,7 @@ from convexrough.normal.claims import Claim, tolerance
 from convexrough.normal.problem import NormalProblem
 from convexrough.scene.neighbours import nearest_distances
 from convexrough.scene.scene import Scene
-from convexrough.surface.height_grid import steps
+from convexrough.surface.map_arrays import steps
 from convexrough.tabular.columns import bound
 from convexrough.tabular.roles import Reading
 from convexrough.tabular.table import ReadTable, few, read_table
