@@ -44,11 +44,8 @@ def assert_certified(
     The check is passed if it is proved that exactly the asperities with a load touch, and that no
     error exceeds `within`; otherwise AssertionError is raised.
 
-    loads  : (n,) [force] from any source, in the order of the scene's asperities
-    approach [length] or load [force] : the prescribed quantity, exactly one
-    within : largest error allowed: of a load, as a fraction of the largest load; of the sum, as a
-        fraction of a prescribed total
-    floor  : [force] a load up to this size counts as 0: its asperity is claimed to be open
+    Arguments are those of `verify`: loads (n,) [force] from any source; the prescribed approach
+    [length] or load [force]; the largest error allowed; and a floor up to which loads count as 0.
 
     >>> cr.testing.assert_certified(scene, contact.loads, approach=5e-5, within=1e-9).scope
     'global'
@@ -76,8 +73,7 @@ def assert_shear_certified(
 
     forces  : (n,) [force] shear force of each asperity on first loading, from any source
     force   : [force] the prescribed sum of the shear forces
-    within  : largest error allowed: of a force, as a fraction of the largest force; of the sum, as
-        a fraction of the prescribed sum
+    within  : largest error allowed, as a fraction of the largest force, and of the prescribed sum
     sliding : (n,) True where sliding is claimed; default: where |force| is at least (1 - 1e-4) f
         P_i, with the coefficient of friction f and the load P_i
 

@@ -77,12 +77,7 @@ def self_affine_moments(
 
 
 def _waves(
-    hurst: float,
-    rms_slope: float,
-    rolloff: float,
-    pixels: int,
-    pixel: float,
-    cutoff: float | None,
+    hurst: float, rms_slope: float, rolloff: float, pixels: int, pixel: float, cutoff: float | None
 ) -> tuple[Indices, Array]:
     """The waves of a map, one for each pair of opposite wave vectors, in an order independent of
     `pixels`: (n, 2) numbers of wavelengths along x and y, and (n,) variances [length^2].

@@ -104,9 +104,9 @@ def read_table(
         source = _source(path, known, sheet) if table is None else _text_source(table)
     alone = source.header is None and len(source.rows) == 1 and not how.columns
     if unnamed and alone and (len(source.columns) > 3 or len(source.columns) == line):
-        cells = [column[0] for column in source.columns]
-        rows = [f"{source.rows[0]}, cell {i}" for i in range(1, len(cells) + 1)]
-        source = source._replace(columns=[cells], rows=rows, lines=[*map(str, cells)])
+        line_cells = [column[0] for column in source.columns]
+        rows = [f"{source.rows[0]}, cell {i}" for i in range(1, len(line_cells) + 1)]
+        source = source._replace(columns=[line_cells], rows=rows, lines=[*map(str, line_cells)])
     headers = source.header or [""] * len(source.columns)
     if source.header is None and not how.columns:
         headers = next((each for each in unnamed if len(each) == len(headers)), headers)
@@ -137,7 +137,7 @@ def read_table(
     if not source.rows and not mistakes and not source.mistakes:
         mistakes = ["rows: found none below the header, expected at least one"]
     if missing or not source.rows:
-        raise TableError(str(path), few([*mistakes, *source.mistakes]))
+        refuse(path, [*mistakes, *source.mistakes])
     names = source.header or [str(i + 1) for i in range(len(source.columns))]
     units = {name: found for name, place in places.items() if (found := unit(names[place]))}
     factors, wrong = roles.factors_of([name for name in places if COLUMNS[name].kind], units, how)
@@ -157,8 +157,7 @@ def read_table(
             numbers = _numbers(name, cells, source, mistakes, name in holes)
             mistakes += _thousands([cells], source)
             read[name] = numbers * factors.get(name, 1.0)
-    if mistakes := [*mistakes, *source.mistakes]:
-        raise TableError(str(path), few(mistakes))
+    refuse(path, [*mistakes, *source.mistakes])
     unread = {names[i]: source.numbers_or_text(i) for i in rest}
     if index is not None:
         unread["index"] = source.numbers_or_text(index)
@@ -174,8 +173,7 @@ def matrix(path: Path, table: TextTable) -> Array:
         _numbers(str(i), cells, source, mistakes, True) for i, cells in enumerate(source.columns, 1)
     ]
     mistakes += _thousands(source.columns, source)
-    if mistakes := [*mistakes, *source.mistakes]:
-        raise TableError(str(path), few(mistakes))
+    refuse(path, [*mistakes, *source.mistakes])
     return np.column_stack(columns)
 
 
@@ -289,6 +287,12 @@ def _numbers(
 
 def _shown(mistake: str, line: str) -> str:
     return f"{mistake}: {shortened(line)}" if line else mistake
+
+
+def refuse(path: Path, mistakes: list[str]) -> None:
+    """Raise TableError with the first mistakes of a file, if there are any."""
+    if mistakes:
+        raise TableError(str(path), few(mistakes))
 
 
 def few(mistakes: list[str], most: int = MOST_MISTAKES) -> list[str]:

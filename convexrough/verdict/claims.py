@@ -24,7 +24,7 @@ from convexrough.scene.scene import Scene
 from convexrough.surface.map_arrays import steps
 from convexrough.tabular.columns import bound
 from convexrough.tabular.roles import Reading
-from convexrough.tabular.table import ReadTable, few, read_table
+from convexrough.tabular.table import ReadTable, read_table, refuse
 from convexrough.tabular.units import bare, unit
 from convexrough.verdict.placing import Placing, unused
 from convexrough.verdict.verdict import verify_on
@@ -130,8 +130,7 @@ def _claimed_to_slide(forces: Claimed, contact: Contact) -> NDArray[np.bool_] | 
     for i in np.flatnonzero(wrong) if not mistakes else ():
         found = f'found "{said[i]}" at asperity {i}, which is proved {contact.status[i]}'
         mistakes.append(f"column status: {found}")
-    if mistakes:
-        raise TableError(str(forces.path), few(mistakes))
+    refuse(forces.path, mistakes)
     by_force = claims_sliding(contact, forces.values)
     return np.where(said == "undecided", by_force, said == "sliding")
 
@@ -155,8 +154,7 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
     if summed and not given:
         expected = f"both, of nodes or pixels{unused(table)}"
         mistakes.append(f"columns: found neither x nor y, expected {expected}")
-    if mistakes:
-        raise TableError(str(path), mistakes)
+    refuse(path, mistakes)
     read = name if name in columns else "pressure"
     areas = _areas(path, table, len(scene)) if read == "pressure" else 1.0
     values = columns[read] * areas * (how.sign if name == "load" else 1)
@@ -173,8 +171,7 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
         place.mistakes += _negative(forces if summed else values, floor, how.sign, read, mistake)
         if name == "load" and not summed:
             place.mistakes += _contradicted(values, floor, table)
-    if place.mistakes:
-        raise TableError(str(path), few(place.mistakes))
+    refuse(path, place.mistakes)
     status = None
     if "status" in columns:
         status = np.full(len(scene), "open", dtype=np.result_type(columns["status"], "U4"))
@@ -260,8 +257,7 @@ def _areas(path: Path, table: ReadTable, count: int) -> Any:
         areas = columns["area"]
         wrong = np.flatnonzero((areas < 0) | ((areas == 0) & (columns["pressure"] != 0)))
         said = ", column area: found {:g}, expected a positive number"
-        if mistakes := [table.mistake(i, said.format(areas[i])) for i in wrong.tolist()]:
-            raise TableError(str(path), few(mistakes))
+        refuse(path, [table.mistake(i, said.format(areas[i])) for i in wrong.tolist()])
         return areas
     try:
         (i, dx), (j, dy) = (steps(name, columns[name]) for name in ("x", "y"))

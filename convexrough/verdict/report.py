@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 from xml.etree import ElementTree
 
@@ -79,18 +79,26 @@ def _size(claim: Claim) -> str:
 
 def describe_claim(claim: Claim, others: str = "") -> list[str]:
     """Aligned lines about a claim; `others` follows the number of rows that a table leaves out."""
+    length, force = claim.of.units
+    units = {"x": length, "y": length, claim.one: force}
+    heads = [f"{each} [{unit}]" if unit else each for each, unit in units.items()]
+    nearby, points = claim.nearby(), claim.of.asperities.positions.tolist()
 
-    def table(which: Indices) -> list[str]:
-        lines = _table(claim, which[:MOST_LISTED])
-        more = len(which) - MOST_LISTED
-        return [*lines, f"    and {more:,} more{others}"] if more > 0 else lines
+    def table(which: Indices) -> Iterator[str]:
+        rows: list[list[Any]] = [["index", *heads, "solution", "bound", "status"]]
+        for i in which[:MOST_LISTED]:
+            solution = None if nearby is None else float(nearby[0][i])
+            error = bound(float(claim.errors[i]))
+            rows.append([i, *points[i], float(claim.values[i]), solution, error, claim.status[i]])
+        if len(which):
+            yield from (f"    {line}" for line in aligned(rows))
+        if (more := len(which) - MOST_LISTED) > 0:
+            yield f"    and {more:,} more{others}"
 
     worst = np.argsort(-claim.errors, kind="stable")
-    lines = labelled([
-        ("result" if claim.one == "load" else claim.many, _proved(claim)),
-        ("wrong statuses", str(len(claim.wrongly_claimed) or "none")),
-    ])  # fmt: skip
-    lines[1:1] = [claim.basis] if claim.basis else []
+    lines = labelled([("result" if claim.one == "load" else claim.many, _proved(claim))])
+    lines += [claim.basis] if claim.basis else []
+    lines += labelled([("wrong statuses", str(len(claim.wrongly_claimed) or "none"))])
     for what, which in claim.wrong.items():
         if len(which):
             lines += [f"  {what}: {len(which):,}", *table(worst[np.isin(worst, which)])]
@@ -117,11 +125,10 @@ def reason(claim: Claim) -> str:
 def junit(found: Sequence[Claim] | ConvexroughError, files: str) -> bytes:
     """JUnit XML about `files`, with a case for each check of each claim, or one for an error."""
     suite = ElementTree.Element("testsuite", name=f"convexrough verify {files}")
-    if isinstance(found, ConvexroughError):
-        kind, cases = "error", {"input": str(found)}
-    else:
-        kind, cases = "failure", {f"{it.many}: {name}": text for it in found
-                                  for name, text in _findings(it).items()}  # fmt: skip
+    kind, cases = "error", {"input": str(found)}
+    if not isinstance(found, ConvexroughError):
+        named = ((it.many, *each) for it in found for each in _findings(it).items())
+        kind, cases = "failure", {f"{many}: {name}": text for many, name, text in named}
     for name, text in cases.items():
         case = ElementTree.SubElement(suite, "testcase", classname=suite.get("name", ""), name=name)
         if text:
@@ -148,22 +155,6 @@ def _findings(claim: Claim) -> dict[str, str]:
         "off": "" if claim.near_enough else _off(claim),
         "total": "" if claim.total_holds else _total(claim, ""),
     }
-
-
-def _table(claim: Claim, which: Indices) -> list[str]:
-    if len(which) == 0:
-        return []
-    length, force = claim.of.units
-    names = {"x": length, "y": length, claim.one: force}
-    named = [f"{each} [{unit}]" if unit else each for each, unit in names.items()]
-    nearby, points = claim.nearby(), claim.of.asperities.positions.tolist()
-    rows = [
-        (i, *points[i], float(claim.values[i]), None if nearby is None else float(nearby[0][i]),
-         bound(float(claim.errors[i])), claim.status[i])
-        for i in which
-    ]  # fmt: skip
-    table = aligned([["index", *named, "solution", "bound", "status"], *rows])
-    return [f"    {line}" for line in table]
 
 
 def _off(claim: Claim) -> str:
