@@ -63,15 +63,13 @@ def remove_unfinished(folder: Path) -> None:
     """Remove the unfinished files and folders of processes that no longer run."""
     for path in folder.iterdir():
         found = _UNFINISHED.fullmatch(path.name)
-        if not found or path.is_symlink() or _runs(int(found["process"])):
+        if not found or path.is_symlink():
+            continue
+        import psutil  # imported only when an unfinished file is found
+
+        if psutil.pid_exists(int(found["process"])):
             continue
         if path.is_dir():
             shutil.rmtree(path, ignore_errors=True)
         elif path.is_file():
             path.unlink(missing_ok=True)
-
-
-def _runs(process: int) -> bool:
-    import psutil  # imported only when an unfinished file is found
-
-    return psutil.pid_exists(process)

@@ -126,9 +126,9 @@ class Contact(Cached, Table, Plottable):
         >>> contact.warnings
         ()
         """
-        from convexrough.plausibility import warnings_of  # a higher layer
+        from convexrough.plausibility import cautions_of, doubts_of  # a higher layer
 
-        return tuple(warnings_of(self))
+        return (*doubts_of(self), *cautions_of(self))
 
     def proof(self, *, sheared: Sequence[ShearedState] = ()) -> Proof:
         """A proof for `convexrough check` and other checkers; its method `save(path)` writes it.

@@ -64,12 +64,6 @@ def limits(
     }
 
 
-def warnings_of(contact: Contact) -> Iterator[str]:
-    """Reasons to doubt a contact, each a sentence with numbers."""
-    yield from doubts_of(contact)
-    yield from cautions_of(contact)
-
-
 def wrong_loads(contact: Contact) -> Iterator[str]:
     """A warning if the loads may be far from the exact solution, whose statuses are proved."""
     proof, largest = contact.certificate, float(contact.loads.max())
@@ -99,7 +93,13 @@ def cautions_of(contact: Contact) -> Iterator[str]:
 
 def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
     """Warnings about the `limits` of the model, which the certificate does not cover."""
-    yield from unlikely_modulus(normal["contact_modulus"], units)
+    unit, modulus = units.unit("pressure"), normal["contact_modulus"]
+    if unit is not None and not RUBBER <= (pascals := modulus * float(unit.size)) <= DIAMOND:
+        limit = f"softer than rubber, {RUBBER:g}" if pascals < RUBBER else f"above {DIAMOND:g}"
+        yield (
+            f"the contact modulus is {described_modulus(modulus, units)}: {limit} Pa; check that "
+            "it is in the units of [units]"
+        )
     if (normal["friction"] or 0.0) > HIGH_FRICTION:
         yield (
             f"the coefficient of friction is {normal['friction']:g}: few pairs of bodies exceed "
@@ -147,10 +147,10 @@ def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
             "not represent the pressure of the disc at these summits"
         )
     if normal["beyond_hardness"]:
-        unit = f" {units.pressure}".rstrip()
+        named = f" {units.pressure}".rstrip()
         yield (
-            f"mean pressure up to {normal['mean_pressure']:.4g}{unit} exceeds the hardness "
-            f"{normal['hardness']:.4g}{unit} on {normal['beyond_hardness']} of "
+            f"mean pressure up to {normal['mean_pressure']:.4g}{named} exceeds the hardness "
+            f"{normal['hardness']:.4g}{named} on {normal['beyond_hardness']} of "
             f"{normal['contact']} asperities: they would yield"
         )
 
@@ -201,17 +201,6 @@ def array_extent(scene: Scene, load: float) -> float | None:
     low, high = scene.asperities.layout.corners
     reached = np.maximum(-low, high)
     return float((reached / axes)[reached > 0].min(initial=np.inf))
-
-
-def unlikely_modulus(modulus: float, units: UnitNames) -> Iterator[str]:
-    """A warning if units are named and the contact modulus is below rubber or above diamond."""
-    unit = units.unit("pressure")
-    if unit is not None and not RUBBER <= (pascals := modulus * float(unit.size)) <= DIAMOND:
-        limit = f"softer than rubber, {RUBBER:g}" if pascals < RUBBER else f"above {DIAMOND:g}"
-        yield (
-            f"the contact modulus is {described_modulus(modulus, units)}: {limit} Pa; check that "
-            "it is in the units of [units]"
-        )
 
 
 def described_modulus(modulus: float, units: UnitNames) -> str:

@@ -2,7 +2,7 @@
 
 from convexrough.surface.boundary_elements import Whole as Whole
 from convexrough.surface.boundary_elements import press_whole as press_whole
-from convexrough.surface.moments import Moments as Moments
+from convexrough.surface.pixels import Moments as Moments
 from convexrough.surface.provability import Provability as Provability
 from convexrough.surface.provability import crowded as crowded
 from convexrough.surface.provability import model_errors as model_errors

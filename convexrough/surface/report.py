@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -71,12 +72,10 @@ class Scanned:
         maxima, summits = surface.summits(0.0, fit), surface.summits(prune, fit)
         if press is None:
             return cls(surface, maxima, summits)
-        curve = provability(maxima, press, levels=[*LEVELS, prune])
-        try:
+        curve, contact = provability(maxima, press, levels=[*LEVELS, prune]), None
+        with suppress(SolverError):
             contact = press(summits)
-        except SolverError:
-            return cls(surface, maxima, summits, curve)
-        pressed = press_whole(surface, contact) if whole else None
+        pressed = press_whole(surface, contact) if whole and contact is not None else None
         return cls(surface, maxima, summits, curve, contact, pressed)
 
     @property

@@ -8,7 +8,7 @@ from convexrough import checks
 from convexrough.arrays import Array, Indices
 from convexrough.errors import InputError
 from convexrough.scene.asperities import checked_seed
-from convexrough.surface.moments import Moments
+from convexrough.surface.pixels import Moments
 from convexrough.surface.surface import Surface
 
 #: Default of the shortest wavelength, in pixels. Pixels of this size resolve tips.

@@ -16,7 +16,7 @@ from convexrough.record import Along, Record, Table
 from convexrough.scene.asperities import Asperities
 from convexrough.sphere import ellipse
 from convexrough.surface.detrend import Removed
-from convexrough.surface.moments import Moments
+from convexrough.surface.pixels import Moments
 
 
 @dataclass(frozen=True, repr=False)

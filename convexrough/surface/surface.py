@@ -18,7 +18,6 @@ from convexrough.plottable import Plottable
 from convexrough.record import Record
 from convexrough.surface import pixels
 from convexrough.surface.detrend import TRENDS, Removed, Trend, fitted
-from convexrough.surface.moments import Moments, moments_of
 from convexrough.surface.summits import Origin, Summits, fit_tips
 from convexrough.tabular.units import known_unit
 
@@ -152,9 +151,9 @@ class Surface(Record, Plottable):
         return float(np.sqrt(2 * self.moments.m2))
 
     @cached_property
-    def moments(self) -> Moments:
+    def moments(self) -> pixels.Moments:
         """Spectral moments, and statistics of summits that follow from them."""
-        return moments_of(self.heights, self.pixel)
+        return pixels.moments_of(self.heights, self.pixel)
 
     @cached_property
     def hills(self) -> pixels.Hills:

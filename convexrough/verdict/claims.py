@@ -261,24 +261,18 @@ def _areas(path: Path, table: ReadTable, count: int) -> Any:
         return areas
     try:
         (i, dx), (j, dy) = (steps(name, columns[name]) for name in ("x", "y"))
-        _check_one_size(i, j, count)
+        if len(i) < (i.max() + 1) * (j.max() + 1):  # not a full grid
+            pixels = np.column_stack((i, j))
+            # Up to `count` may be alone: the contact of each asperity may be one pixel large.
+            alone = pixels[nearest_distances(pixels.astype(np.float64)) > 1.5]
+            if len(alone) > count and (np.gcd.reduce(alone - alone[0]) > 1).all():
+                raise InputError("x, y", found="pixels of several sizes", expected="one size")
         _check_whole(i, j, columns["pressure"] != 0)
     except InputError as error:
         expected = f"a column 'area', or x and y on a regular grid: {error.what} {error.found}"
         mistake = f"columns: found pressure without areas, expected {expected}"
         raise TableError(str(path), [mistake]) from error
     return dx * dy * (1 if np.ptp((i + j) % 2) else 2)
-
-
-def _check_one_size(i: Indices, j: Indices, count: int) -> None:
-    """Raise InputError if pixels have several sizes: if more pixels than asperities (whose contacts
-    may be one pixel large) have no neighbours, and lie on a coarser grid."""
-    if len(i) == (i.max() + 1) * (j.max() + 1):
-        return  # a full grid
-    pixels = np.column_stack((i, j))
-    alone = pixels[nearest_distances(pixels.astype(np.float64)) > 1.5]
-    if len(alone) > count and (np.gcd.reduce(alone - alone[0]) > 1).all():
-        raise InputError("x, y", found="pixels of several sizes", expected="one size")
 
 
 def _check_whole(i: Indices, j: Indices, loaded: NDArray[np.bool_]) -> None:
