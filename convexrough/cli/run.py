@@ -69,16 +69,11 @@ def _part(context: Any, option: Any, value: str | None) -> tuple[int, int] | Non
 
 @click.command()
 @click.argument("sweep", type=common.PATH, required=False)
-@click.option("--part", metavar="K/N", callback=_part,
-              help="Compute the K-th of N shares of the scenes.")  # fmt: skip
-@click.option("--resume", is_flag=True, help="Continue an interrupted sweep.")
-@click.option("--scheduler", metavar="ADDRESS",
-              help='Dask scheduler: tcp://..., a file, or "local".')  # fmt: skip
-@click.option("--workers", metavar="N", type=click.IntRange(1),
-              help="Number of processes; default: all cores.")  # fmt: skip
-@click.option(
-    "--summary", metavar="DIR", type=common.PATH, help="Print quantiles of the results in DIR."
-)
+@common.option("--part K/N", "Compute the K-th of N shares of the scenes.", callback=_part)
+@common.option("--resume", "Continue an interrupted sweep.")
+@common.option("--scheduler ADDRESS", 'Dask scheduler: tcp://..., a file, or "local".')
+@common.option("--workers N", "Number of processes; default: all cores.", click.IntRange(1))
+@common.option("--summary DIR", "Print quantiles of the results in DIR.", common.PATH)
 @common.output_options("out", "force", "as_json")
 def sweep(
     output: common.Output,

@@ -13,13 +13,11 @@ from convexrough.errors import FileError, blamed_on
 @click.command()
 @click.argument("scene", type=common.PATH)
 @common.solver_option
-@click.option("--within", metavar="PART", type=click.FloatRange(0, min_open=True), default=1e-3,
-              show_default=True,
-              help="Largest difference allowed between a load and that of Newton's method, as a "
-              "fraction of the largest load.")  # fmt: skip
-@click.option("--log", metavar="FILE", type=common.PATH,
-              help="Write the iterations of Newton's method and Clarabel to a CSV file."
-              )  # fmt: skip
+@common.option("--within PART", "Largest difference allowed between a load and that of Newton's "
+               "method, as a fraction of the largest load.",
+               click.FloatRange(0, min_open=True), default=1e-3, show_default=True)  # fmt: skip
+@common.option("--log FILE", "Write the iterations of Newton's method and Clarabel to a CSV file.",
+               common.PATH)  # fmt: skip
 @common.output_options("as_json")
 def compare(
     output: common.Output, scene: Path, solvers: tuple[str, ...], within: float, log: Path | None
@@ -68,11 +66,11 @@ def compare(
 
 @click.command()
 @click.argument("scene", type=common.PATH)
-@click.option("--format", "formats", type=click.Choice(["cbf", "json", "mps", "npz"]),
-              multiple=True, help="Write only this format; may be repeated.")  # fmt: skip
-@click.option("--bristles", metavar="M", type=click.IntRange(1), default=64, show_default=True,
-              help="Bristles per asperity in the quadratic program (HiGHS is slow above 16).",
-              )  # fmt: skip
+@common.option("--format", "Write only this format; may be repeated.",
+               click.Choice(("cbf", "json", "mps", "npz")), name="formats", multiple=True
+               )  # fmt: skip
+@common.option("--bristles M", "Bristles per asperity in the quadratic program (HiGHS is slow "
+               "above 16).", click.IntRange(1), default=64, show_default=True)  # fmt: skip
 @common.output_options("out", "force", "as_json")
 def export(output: common.Output, scene: Path, formats: tuple[str, ...], bristles: int) -> int:
     """Write a scene as cone and quadratic programs for other solvers.
@@ -112,9 +110,9 @@ def export(output: common.Output, scene: Path, formats: tuple[str, ...], bristle
 
 
 @click.command()
-@click.option("--list", "show_list", is_flag=True, help="List the cases (default).")
-@click.option("--export", metavar="DIR", type=common.PATH, help="Folder for programs and answers.")
-@click.option("--profile", is_flag=True, help="Time every solver and check its solutions.")
+@common.option("--list", "List the cases (default).", name="show_list")
+@common.option("--export DIR", "Folder for programs and answers.", common.PATH)
+@common.option("--profile", "Time every solver and check its solutions.")
 @common.solver_option
 @click.argument("names", nargs=-1)
 @common.output_options("force", "as_json")
@@ -177,8 +175,8 @@ def gallery(
 
 @click.command()
 @common.output_options("out", "no_figures", "force", "as_json")
-@click.option("--quick", is_flag=True, help="Use fewer and smaller scenes.")
-@click.option("--page", metavar="FILE", type=common.PATH, help="Also update this Markdown page.")
+@common.option("--quick", "Use fewer and smaller scenes.")
+@common.option("--page FILE", "Also update this Markdown page.", common.PATH)
 def bench(output: common.Output, quick: bool, page: Path | None) -> int:
     """Measure time and error of solvers for many scene sizes.
 

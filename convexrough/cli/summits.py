@@ -67,7 +67,7 @@ class Pressing(NamedTuple):
         return surface, lambda it: pressed(base(asperities=it))
 
 
-def _pixel(given: str | None) -> float | tuple[float, ...] | None:
+def _pixel(context: Any, option: Any, given: str | None) -> float | tuple[float, ...] | None:
     if given is None:
         return None
     try:
@@ -80,30 +80,26 @@ def _pixel(given: str | None) -> float | tuple[float, ...] | None:
 
 @click.command()
 @click.argument("surface", type=common.PATH)
-@click.option("--scene", metavar="SCENE", type=common.PATH, help="Press as in this scene file.")
-@click.option("--radius", metavar="R", type=float,
-              help="Radius of the sphere, in the unit of the map; not with --scene.")  # fmt: skip
-@click.option("--approach", metavar="D", type=float,
-              help="Prescribed approach, in the unit of the map.")  # fmt: skip
-@click.option("--load", metavar="P", type=float, help="Prescribed load; needs --modulus.")
-@click.option("--modulus", metavar="E", type=float,
-              help="Contact modulus E*, in the unit of load per unit of the map squared."
-              )  # fmt: skip
-@click.option("--pixel", metavar="X[,Y]", callback=lambda *given: _pixel(given[-1]),
-              help="Size of a pixel in --unit, if the file states none.")  # fmt: skip
-@click.option("--unit", metavar="UNIT", help="Unit of pixel and heights: µm, mm, ...")
-@click.option("--height-unit", metavar="UNIT", help="Unit of the heights, if not --unit.")
-@click.option("--detrend", type=click.Choice(["plane", "sphere", "paraboloid", "none"]),
-              default="plane", show_default=True,
-              help="Form to remove before finding summits.")  # fmt: skip
-@click.option("--fill", is_flag=True, help="Fill holes in the map and report them.")
-@click.option("--fit", metavar="N", type=int, default=3, show_default=True,
-              help="Fit a paraboloid to N by N pixels about each maximum; N is odd.")  # fmt: skip
-@click.option("--prune", metavar="PART", type=float, default=0.05, show_default=True,
-              help="Merge hills whose prominence is below the fraction PART of the "
-                   "height range Sz.")  # fmt: skip
-@click.option("--whole", is_flag=True,
-              help="Also press the whole map by boundary elements.")  # fmt: skip
+@common.option("--scene SCENE", "Press as in this scene file.", common.PATH)
+@common.option("--radius R", "Radius of the sphere, in the unit of the map; not with --scene.",
+               float)  # fmt: skip
+@common.option("--approach D", "Prescribed approach, in the unit of the map.", float)
+@common.option("--load P", "Prescribed load; needs --modulus.", float)
+@common.option("--modulus E", "Contact modulus E*, in the unit of load per unit of the map "
+               "squared.", float)  # fmt: skip
+@common.option("--pixel X[,Y]", "Size of a pixel in --unit, if the file states none.",
+               callback=_pixel)  # fmt: skip
+@common.option("--unit UNIT", "Unit of pixel and heights: µm, mm, ...")
+@common.option("--height-unit UNIT", "Unit of the heights, if not --unit.")
+@common.option("--detrend", "Form to remove before finding summits.",
+               click.Choice(("plane", "sphere", "paraboloid", "none")), default="plane",
+               show_default=True)  # fmt: skip
+@common.option("--fill", "Fill holes in the map and report them.")
+@common.option("--fit N", "Fit a paraboloid to N by N pixels about each maximum; N is odd.",
+               int, default=3, show_default=True)  # fmt: skip
+@common.option("--prune PART", "Merge hills whose prominence is below the fraction PART of the "
+               "height range Sz.", float, default=0.05, show_default=True)  # fmt: skip
+@common.option("--whole", "Also press the whole map by boundary elements.")
 @common.output_options("formats", "dpi", "out", "no_figures", "force", "as_json")
 def summits(
     output: common.Output,

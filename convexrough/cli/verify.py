@@ -60,34 +60,26 @@ def _pairs(option: str, given: Sequence[str]) -> dict[str, str]:
 @click.command()
 @click.argument("scene", type=common.PATH)
 @click.argument("loads", type=common.PATH)
-@click.option("--within", metavar="PART", type=float, default=0.01, show_default=True,
-              help="Largest error allowed of a load or shear force, as a fraction of the largest "
-              "one. If their sum is prescribed, its error counts as a fraction of it."
-              )  # fmt: skip
-@click.option("--floor", metavar="X", type=float, default=0.0,
-              help="Treat loads from -X to X as zero: their asperities are claimed to be open."
-              )  # fmt: skip
-@click.option("--tolerance", metavar="X", type=float,
-              help="Largest distance of a position in the file from its asperity; default 1 % of "
-              "the smallest distance of two asperities.")  # fmt: skip
-@click.option("--column", metavar="NAME=COLUMN", multiple=True,
-              help="Read NAME (load, x, index, ...) from this column: a header, or a number from 1."
-              )  # fmt: skip
-@click.option("--scale", metavar="NAME=FACTOR", multiple=True,
-              help="Multiply the numbers of the column NAME by FACTOR.")  # fmt: skip
-@click.option("--sign", type=click.Choice(["1", "-1"]), default="1",
-              help="Use -1 if compression is negative in the file.")  # fmt: skip
-@click.option("--missing-open", is_flag=True,
-              help="Asperities without a row are claimed to be open.")  # fmt: skip
-@click.option("--nodes", is_flag=True,
-              help="Rows are nodes; sum their forces by asperity.")  # fmt: skip
-@click.option("--shear", metavar="FORCES", type=common.PATH,
-              help="Also check the shear forces in this file, after the total shear force has "
-              "grown from 0 to the Q of --shear-force.")  # fmt: skip
-@click.option("--shear-force", metavar="Q", type=float,
-              help="Prescribed sum of the forces in FORCES.")  # fmt: skip
-@click.option("--explain", is_flag=True, help="Report how the files are read, and stop.")
-@click.option("--junit", metavar="FILE", type=common.PATH, help="Write the findings as JUnit XML.")
+@common.option("--within PART", "Largest error allowed of a load or shear force, as a fraction of "
+               "the largest one. If their sum is prescribed, its error counts as a fraction of it.",
+               float, default=0.01, show_default=True)  # fmt: skip
+@common.option("--floor X", "Treat loads from -X to X as zero: their asperities are claimed to be "
+               "open.", float, default=0.0)  # fmt: skip
+@common.option("--tolerance X", "Largest distance of a position in the file from its asperity; "
+               "default 1 % of the smallest distance of two asperities.", float)  # fmt: skip
+@common.option("--column NAME=COLUMN", "Read NAME (load, x, index, ...) from this column: a "
+               "header, or a number from 1.", multiple=True)  # fmt: skip
+@common.option("--scale NAME=FACTOR", "Multiply the numbers of the column NAME by FACTOR.",
+               multiple=True)  # fmt: skip
+@common.option("--sign", "Use -1 if compression is negative in the file.",
+               click.Choice(["1", "-1"]), default="1")  # fmt: skip
+@common.option("--missing-open", "Asperities without a row are claimed to be open.")
+@common.option("--nodes", "Rows are nodes; sum their forces by asperity.")
+@common.option("--shear FORCES", "Also check the shear forces in this file, after the total shear "
+               "force has grown from 0 to the Q of --shear-force.", common.PATH)  # fmt: skip
+@common.option("--shear-force Q", "Prescribed sum of the forces in FORCES.", float)
+@common.option("--explain", "Report how the files are read, and stop.")
+@common.option("--junit FILE", "Write the findings as JUnit XML.", common.PATH)
 @common.output_options("proof", "out", "force", "as_json")
 def verify(
     output: common.Output,
