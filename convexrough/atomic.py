@@ -25,11 +25,8 @@ def unfinished(path: Path) -> Path:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A context manager that yields a temporary path, to which the body writes a file.
-
-    If the body succeeds, the temporary file replaces `path`; otherwise it is removed. It remains if
-    the process is killed. Raises FileError if `path` cannot be written.
-    """
+    """A context manager: the body writes to the path it gets, which then replaces `path`. A file
+    that is not complete is removed, except if the process is killed."""
     temporary = unfinished(path)
     try:
         with file_errors(path, "be written"):
@@ -66,15 +63,13 @@ def remove_unfinished(folder: Path) -> None:
     """Remove the unfinished files and folders of processes that no longer run."""
     for path in folder.iterdir():
         found = _UNFINISHED.fullmatch(path.name)
-        if not found or path.is_symlink() or _runs(int(found["process"])):
+        if not found or path.is_symlink():
+            continue
+        import psutil  # imported only when an unfinished file is found
+
+        if psutil.pid_exists(int(found["process"])):
             continue
         if path.is_dir():
             shutil.rmtree(path, ignore_errors=True)
         elif path.is_file():
             path.unlink(missing_ok=True)
-
-
-def _runs(process: int) -> bool:
-    import psutil  # imported only when an unfinished file is found
-
-    return psutil.pid_exists(process)

@@ -21,14 +21,10 @@ SIZED = f"a size from {SMALLEST:g} to {LARGEST:g}; choose other units"
 
 
 class Kind(NamedTuple):
-    """A check of a number; an instance is called with a name and a value.
+    """A check of a number; an instance is called with a name and a value."""
 
-    expected : description of valid numbers, for error messages
-    holds    : function that returns True for a valid number; called with finite numbers only
-    """
-
-    expected: str
-    holds: Callable[[float], bool]
+    expected: str  # description of valid numbers, for error messages
+    holds: Callable[[float], bool]  # True for a valid number; called with finite numbers only
 
     def __call__(self, what: str, value: float | None) -> float:
         """The value of `what` as a float; raises InputError unless it is valid and `is_sized`."""
@@ -73,11 +69,8 @@ def whole(what: str, value: int, least: int = 1) -> int:
 
 
 def numbers(what: str, values: ArrayLike, expected: str = "numbers") -> Array:
-    """A float64 copy, of any shape; raises InputError unless all values are real numbers.
-
-    If an array of equal values stores only one number (`arrays.even`), its copy does not store
-    more.
-    """
+    """A float64 copy, of any shape, that stores one number if `arrays.even` made the original;
+    raises InputError unless all values are real numbers."""
     if isinstance(values, np.ma.MaskedArray) and values.mask.any():
         found = f"{values.mask.sum()} masked values"
         raise InputError(what, found=found, expected=f"{expected} without gaps")

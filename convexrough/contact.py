@@ -126,9 +126,9 @@ class Contact(Cached, Table, Plottable):
         >>> contact.warnings
         ()
         """
-        from convexrough.plausibility import warnings_of  # a higher layer
+        from convexrough.plausibility import cautions_of, doubts_of  # a higher layer
 
-        return tuple(warnings_of(self))
+        return (*doubts_of(self), *cautions_of(self))
 
     def proof(self, *, sheared: Sequence[ShearedState] = ()) -> Proof:
         """A proof for `convexrough check` and other checkers; its method `save(path)` writes it.
@@ -400,8 +400,13 @@ def _model_limits(problem: NormalProblem, solution: Solution, radii: Array) -> t
     all_touch = len(touching) == len(problem)
     A = problem.influence if all_touch else problem.influence.restricted(touching)
     a = radii[touching]
-    moved = A.scale * A.falloff(solution.loads[touching] * a**2 / 10, 3)
+    moved = discs_as_points(A, solution.loads[touching], a)
     return float((moved / prescribed[touching]).max()), A.crowding(a)
+
+
+def discs_as_points(A: Influence, loads: Array, radii: Array) -> Array:
+    """(n,) upper bounds on the displacements by which point forces differ from discs."""
+    return A.scale * A.falloff(loads * radii**2 / 10, 3)
 
 
 def covered(scene: Scene, radii: Array) -> int:

@@ -63,12 +63,8 @@ class InputError(ConvexroughError, ValueError):
 
 @contextmanager
 def blamed_on(where: object, table: str = "", *, unless_known: bool = False) -> Iterator[None]:
-    """A context manager: put `where` at the beginning of the message of an InputError of the body.
-
-    where, table : as for `InputError.located`
-    unless_known : True to leave errors that already name a place unchanged; a MistakesError is
-        always left unchanged
-    """
+    """A context manager: `InputError.located` for the errors of the body but MistakesErrors and,
+    with `unless_known`, those that already name a place."""
     try:
         yield
     except InputError as error:
@@ -109,10 +105,7 @@ class FileError(ConvexroughError):
 
 @contextmanager
 def file_errors(path: Path, what: str) -> Iterator[None]:
-    """A context manager: turn an OSError of the body into a FileError about `path`.
-
-    what : what could not be done, such as "be read"
-    """
+    """A context manager: turn an OSError of the body into a FileError: `path` "cannot" `what`."""
     try:
         yield
     except OSError as error:
@@ -173,10 +166,7 @@ class ExtraError(ConvexroughError, ImportError):
 
 
 def needed(module: str, extra: str = "") -> Any:
-    """The module of an optional package. Raises ExtraError if it is not installed.
-
-    extra : the name of the extra; default: the name of the module
-    """
+    """The module of an optional package; ExtraError, with the `extra`, if it is not installed."""
     try:
         return import_module(module)
     except ImportError as error:

@@ -222,9 +222,9 @@ def press_many(
             raise SolverError(what, solver=solver, advice=advice, iterate=error.iterate) from error
         proof = one.certificate
         errors = proof.load_errors.sum() + n * ROUNDOFF * one.load  # and the rounding of the sum
-        totals = one.load, errors * (1 + SAFETY), one.approach, proof.approach_error
-        own: tuple[Any, ...] = (*totals, one.loads, proof.load_errors, proof.status)
-        for values, value in zip(fields.values(), own, strict=True):
+        own = one.load, errors * (1 + SAFETY), one.approach, proof.approach_error
+        arrays = one.loads, proof.load_errors, proof.status
+        for values, value in zip(fields.values(), (*own, *arrays), strict=True):
             values[k] = value
     contacts = Contacts(
         scenes=scenes,

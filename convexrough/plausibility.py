@@ -16,52 +16,23 @@ from convexrough.sphere.smooth import SmoothEllipsoid, smooth_reference
 from convexrough.tabular.columns import bound
 from convexrough.tabular.units import UnitNames
 
-#: Contacts with fewer touching asperities than this cause a warning.
-FEW = 5
-
 #: Least numbers of asperities that may be a part of a larger array: in general, and on a lattice.
 ARRAY, ON_LATTICE = 20, 7
-
-#: An `array_extent` below this causes a warning. At this fraction of the contact radius of a smooth
-#: sphere, its pressure is 0.7 of the peak.
-CUT_OFF = 0.7
-
-#: Above this fraction of touching asperities at the rim of an array there is a warning. It is not
-#: 0, because single tall asperities can touch there.
-CUT_RIM = 0.5
 
 #: Contact moduli [Pa] of soft rubber, and of diamond on a rigid body.
 RUBBER, DIAMOND = 1e6, 1.2e12
 
-#: A larger coefficient of friction causes a warning. Clean metals in vacuum have a larger one.
-HIGH_FRICTION = 2.0
-
-#: A larger bound on the error of a load, as a fraction of the largest load, causes a warning.
-INACCURATE = 0.1
-
-#: At this ratio of contact radius to radius of curvature, paraboloid and sphere differ by 1 %.
-STEEP = 0.2
+# Limits for warnings:
+FEW = 5  # asperities that touch
+CUT_OFF = 0.7  # `array_extent`: there the pressure of a smooth sphere is 0.7 of the peak
+CUT_RIM = 0.5  # `rim_touching`: not 0, because single tall asperities can touch at the rim
+HIGH_FRICTION = 2.0  # which only clean metals in vacuum exceed
+INACCURATE = 0.1  # bound on the error of a load, as a fraction of the largest load
+STEEP = 0.2  # ratio of radii at which paraboloid and sphere differ by 1 %
 
 
 def limits_of(contact: Contact) -> dict[str, Any]:
-    """Measures of the validity of the model, by name; ratios or counts if no unit is given.
-
-    contact      : number of asperities that touch;  covered, crowding : as in `Contact`
-    extent       : largest distance of a point of contact from the axis, divided by the radius of
-        the sphere
-    array_extent : the smaller of max |x| / a and max |y| / b over the asperities. a and b are the
-        half widths of a smooth body's contact at this load. None for a flat or a cylinder, at load
-        0, and if the asperities are too few for an array (`is_array`)
-    rim_touching : fraction of the asperities at the rim that touch; the rim consists of the
-        farthest asperity in each of 16 sectors
-    axis_outside : True for an array whose asperities do not surround the axis of the sphere
-    steepness    : largest ratio of contact radius to tip radius
-    mean_pressure, hardness : [force / length^2] largest mean pressure; the material's hardness or
-        None
-    contact_modulus : [force / length^2];  friction : coefficient of friction or None
-    beyond_hardness : number of asperities whose mean pressure exceeds the hardness
-    mismatch     : Dundurs' beta of the two bodies, whose effect the model neglects
-    """
+    """The measures of `limits` for a contact."""
     areas = contact.crowding, contact.covered
     return limits(contact.scene, contact.loads, contact.contact_radii, *areas)
 
@@ -69,7 +40,7 @@ def limits_of(contact: Contact) -> dict[str, Any]:
 def limits(
     scene: Scene, loads: Array, radii: Array, crowding: float, covered: int
 ) -> dict[str, Any]:
-    """The measures of `limits_of` for loads and contact radii (n,)."""
+    """Measures of the validity of the model, by name, for loads and contact radii (n,)."""
     touching, hardness, pressures = loads > 0, scene.material.hardness, mean_pressures(loads, radii)
     reaches = (
         (np.linalg.norm(scene.contact_points[touching, axes], axis=1) + radii[touching]) / R
@@ -77,26 +48,21 @@ def limits(
     )
     return {
         "contact": int(touching.sum()),
-        "crowding": crowding,
+        "crowding": crowding,  # as in `Contact`, also the next
         "covered": covered,
+        # largest distance of a point of contact from the axis, divided by the sphere's radius
         "extent": max((float(reach.max(initial=0.0)) for reach in reaches), default=0.0),
         "array_extent": array_extent(scene, float(loads.sum())),
         "rim_touching": rim_touching(scene, touching),
         "axis_outside": axis_outside(scene),
         "steepness": float((radii / scene.asperities.tip_radii).max()),
-        "mean_pressure": float(pressures.max()),
+        "mean_pressure": float(pressures.max()),  # [force / length^2]
         "hardness": hardness,
-        "mismatch": scene.material.mismatch,
+        "mismatch": scene.material.mismatch,  # Dundurs' beta, whose effect the model neglects
         "contact_modulus": scene.material.contact_modulus,
         "friction": scene.friction,
         "beyond_hardness": int((pressures > (hardness or np.inf)).sum()),
     }
-
-
-def warnings_of(contact: Contact) -> Iterator[str]:
-    """Reasons to doubt a contact, each a sentence with numbers."""
-    yield from doubts_of(contact)
-    yield from cautions_of(contact)
 
 
 def wrong_loads(contact: Contact) -> Iterator[str]:
@@ -127,11 +93,14 @@ def cautions_of(contact: Contact) -> Iterator[str]:
 
 
 def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
-    """Warnings about the limits of the model, which the certificate does not cover.
-
-    normal : the result of `limits_of` for the contact
-    """
-    yield from unlikely_modulus(normal["contact_modulus"], units)
+    """Warnings about the `limits` of the model, which the certificate does not cover."""
+    unit, modulus = units.unit("pressure"), normal["contact_modulus"]
+    if unit is not None and not RUBBER <= (pascals := modulus * float(unit.size)) <= DIAMOND:
+        limit = f"softer than rubber, {RUBBER:g}" if pascals < RUBBER else f"above {DIAMOND:g}"
+        yield (
+            f"the contact modulus is {described_modulus(modulus, units)}: {limit} Pa; check that "
+            "it is in the units of [units]"
+        )
     if (normal["friction"] or 0.0) > HIGH_FRICTION:
         yield (
             f"the coefficient of friction is {normal['friction']:g}: few pairs of bodies exceed "
@@ -179,10 +148,10 @@ def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
             "not represent the pressure of the disc at these summits"
         )
     if normal["beyond_hardness"]:
-        unit = f" {units.force}/{units.length}²" if units.force and units.length else ""
+        named = f" {units.pressure}".rstrip()
         yield (
-            f"mean pressure up to {normal['mean_pressure']:.4g}{unit} exceeds the hardness "
-            f"{normal['hardness']:.4g}{unit} on {normal['beyond_hardness']} of "
+            f"mean pressure up to {normal['mean_pressure']:.4g}{named} exceeds the hardness "
+            f"{normal['hardness']:.4g}{named} on {normal['beyond_hardness']} of "
             f"{normal['contact']} asperities: they would yield"
         )
 
@@ -201,7 +170,7 @@ def is_array(scene: Scene) -> bool:
 
 
 def axis_outside(scene: Scene) -> bool:
-    """`axis_outside` as in `limits_of`."""
+    """True for an array whose asperities do not surround the axis of the sphere."""
     if not is_array(scene):
         return False
     low, high = scene.asperities.layout.corners
@@ -210,7 +179,7 @@ def axis_outside(scene: Scene) -> bool:
 
 
 def rim_touching(scene: Scene, touching: NDArray[np.bool_]) -> float:
-    """`rim_touching` as in `limits_of`; 0 if the asperities are too few for an array."""
+    """Fraction that touches of the rim (the farthest in each of 16 sectors); 0 without an array."""
     return float(touching[scene.asperities.layout.rim].mean()) if is_array(scene) else 0.0
 
 
@@ -224,7 +193,8 @@ def at_the_rim(extent: float) -> str:
 
 
 def array_extent(scene: Scene, load: float) -> float | None:
-    """`array_extent` as in `limits_of`; for a row of asperities, the ratio along the row."""
+    """The smaller of max |x| / a and max |y| / b over the asperities, with the half widths a and b
+    of a smooth body's contact at this load; None without an array, load or such a contact."""
     smooth = smooth_reference(scene, load) if load > 0 and is_array(scene) else None
     if smooth is None:
         return None
@@ -232,17 +202,6 @@ def array_extent(scene: Scene, load: float) -> float | None:
     low, high = scene.asperities.layout.corners
     reached = np.maximum(-low, high)
     return float((reached / axes)[reached > 0].min(initial=np.inf))
-
-
-def unlikely_modulus(modulus: float, units: UnitNames) -> Iterator[str]:
-    """A warning if units are named and the contact modulus is below rubber or above diamond."""
-    unit = units.unit("pressure")
-    if unit is not None and not RUBBER <= (pascals := modulus * float(unit.size)) <= DIAMOND:
-        limit = f"softer than rubber, {RUBBER:g}" if pascals < RUBBER else f"above {DIAMOND:g}"
-        yield (
-            f"the contact modulus is {described_modulus(modulus, units)}: {limit} Pa; check that "
-            "it is in the units of [units]"
-        )
 
 
 def described_modulus(modulus: float, units: UnitNames) -> str:

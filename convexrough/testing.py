@@ -44,11 +44,8 @@ def assert_certified(
     The check is passed if it is proved that exactly the asperities with a load touch, and that no
     error exceeds `within`; otherwise AssertionError is raised.
 
-    loads  : (n,) [force] from any source, in the order of the scene's asperities
-    approach [length] or load [force] : the prescribed quantity, exactly one
-    within : largest error allowed: of a load, as a fraction of the largest load; of the sum, as a
-        fraction of a prescribed total
-    floor  : [force] a load up to this size counts as 0: its asperity is claimed to be open
+    Arguments are those of `verify`: loads (n,) [force] from any source; the prescribed approach
+    [length] or load [force]; the largest error allowed; and a floor up to which loads count as 0.
 
     >>> cr.testing.assert_certified(scene, contact.loads, approach=5e-5, within=1e-9).scope
     'global'
@@ -76,8 +73,7 @@ def assert_shear_certified(
 
     forces  : (n,) [force] shear force of each asperity on first loading, from any source
     force   : [force] the prescribed sum of the shear forces
-    within  : largest error allowed: of a force, as a fraction of the largest force; of the sum, as
-        a fraction of the prescribed sum
+    within  : largest error allowed, as a fraction of the largest force, and of the prescribed sum
     sliding : (n,) True where sliding is claimed; default: where |force| is at least (1 - 1e-4) f
         P_i, with the coefficient of friction f and the load P_i
 
@@ -129,9 +125,8 @@ def assert_agree(
             for each in (first, second)
         )
         if given != wanted:
-            raise InputError(
-                "second", found=f"prescribed {given}", expected=f"{wanted}, as in the first"
-            )
+            expected = f"{wanted}, as in the first"
+            raise InputError("second", found=f"prescribed {given}", expected=expected)
     for answer in (one, other):
         _check_proof(answer.certificate, f" of {answer.name}")
     if found := contradictions(one, other):
@@ -140,10 +135,8 @@ def assert_agree(
     largest = min(float(one.loads.max()), float(other.loads.max()))
     far = np.flatnonzero(apart > within * largest)
     if len(far):
-        each = (
-            f"{i}: {one.loads[i]:.6g} and {other.loads[i]:.6g}"
-            for i in far[np.argsort(-apart[far])]
-        )
+        worst = far[np.argsort(-apart[far])]
+        each = (f"{i}: {one.loads[i]:.6g} and {other.loads[i]:.6g}" for i in worst)
         part = apart.max() / largest if largest > 0 else np.inf
         raise AssertionError(
             f"{one.name} and {other.name}: loads differ by {part:.2g} of the largest, expected "

@@ -27,11 +27,8 @@ def worthwhile(numbers: int) -> int:
 
 
 def each(work: Callable[[Part], object], parts: Iterable[Part], threads: int) -> None:
-    """Call work(part) for each part, in any order; no call may write what another call reads.
-
-    The calling thread is one of the threads. When `each` returns, all others have ended, so the
-    process may be forked. If calls raise errors, `each` raises one of these errors.
-    """
+    """Call work(part) for each part, in any order, also in this thread; raise one of its errors.
+    No call may write what another call reads. At the end no other thread runs: fork is safe."""
     todo, errors = iter(list(parts)), list[BaseException]()  # `next` of a list's iterator is atomic
 
     def some() -> None:
@@ -63,11 +60,8 @@ _inside: list[Any] = []
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """A context manager: linear algebra in the body uses one thread.
-
-    Several threads would round sums differently and slow down the threads of `each`. The former
-    number of threads is restored when the last thread leaves the body.
-    """
+    """A context manager: linear algebra in the body uses one thread, until the last thread leaves
+    it. Several threads would round sums differently and slow down those of `each`."""
     with _lock:
         if not _inside:
             import scipy.linalg  # noqa: F401  limits apply only to loaded libraries

@@ -18,14 +18,7 @@ from types import FrameType
 import click
 from click.shell_completion import shell_complete
 
-from convexrough.cli.output import (
-    DONE,
-    INTERRUPTED,
-    SOLVER_FAILED,
-    UNHEARD,
-    WRONG_INPUT,
-    say_aside,
-)
+from convexrough.cli import common
 from convexrough.cli.run import check, new, run, sweep
 from convexrough.cli.solvers import bench, compare, export, gallery, paper
 from convexrough.cli.summits import summits
@@ -62,25 +55,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
         except click.ClickException as error:
             error.show()
             if "unexpected extra argument" in error.message:
-                say_aside(
+                common.say_aside(
                     "hint", "quote names that contain spaces, as in --column 'x=X coordinate'"
                 )
             return error.exit_code
         except (click.Abort, KeyboardInterrupt):
-            say_aside("interrupted")
-            return INTERRUPTED
+            common.say_aside("interrupted")
+            return common.INTERRUPTED
         except ConvexroughError as error:
             for line in str(error).splitlines():
-                say_aside("error", line)
+                common.say_aside("error", line)
             stopped = isinstance(error, (SolverError, WorkerError))
-            return SOLVER_FAILED if stopped else WRONG_INPUT
+            return common.SOLVER_FAILED if stopped else common.WRONG_INPUT
         except OSError as error:  # of standard output: errors of files are FileError
             return _unheard(error)
         except Exception:
             if not interrupts:
                 raise
-            say_aside("interrupted")  # compiled code raised another error
-            return INTERRUPTED
+            common.say_aside("interrupted")  # compiled code raised another error
+            return common.INTERRUPTED
 
 
 def _status(arguments: Sequence[str] | None) -> int:
@@ -88,7 +81,7 @@ def _status(arguments: Sequence[str] | None) -> int:
         return shell_complete(program, {}, "convexrough", COMPLETE, asked)
     given = sys.argv[1:] if arguments is None else list(arguments)
     with program.make_context("convexrough", given) as context:
-        status = int(program.invoke(context) or DONE)
+        status = int(program.invoke(context) or common.DONE)
     if sys.stdout is not None:  # it is None where a shell closed it
         sys.stdout.flush()
     return status
@@ -129,8 +122,8 @@ def _interrupts() -> Iterator[list[int]]:
 def _unheard(error: OSError) -> int:
     """The exit status if standard output is closed or full. Result files are complete then."""
     if error.errno != errno.EPIPE:
-        say_aside("error", f"standard output: {error.strerror or error}")
+        common.say_aside("error", f"standard output: {error.strerror or error}")
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 1)  # unwritten output is dropped at exit
     os.close(nowhere)
-    return UNHEARD
+    return common.UNHEARD

@@ -8,27 +8,15 @@ from typing import Any
 
 import click
 
-from convexrough.atomic import replacing
-from convexrough.cli.output import (
-    DONE,
-    INTERRUPTED,
-    NOT_CERTIFIED,
-    OPTIONS,
-    PATH,
-    SOLVER_FAILED,
-    Output,
-    output_options,
-    progress,
-    say_aside,
-    written,
-)
+from convexrough.atomic import write_text
+from convexrough.cli import common
 from convexrough.errors import FileError, WorkerError, blamed_on
 
 
 @click.command()
-@click.argument("scene", type=PATH)
-@output_options(*OPTIONS)
-def run(output: Output, scene: Path) -> int:
+@click.argument("scene", type=common.PATH)
+@common.output_options(*common.OPTIONS)
+def run(output: common.Output, scene: Path) -> int:
     """Compute a scene; print what is proved; write tables and figures.
 
     Results of a.toml go to the folder a-results unless --out names another. --html needs a scene
@@ -53,20 +41,20 @@ def run(output: Output, scene: Path) -> int:
             refuse_many(file.scene)
     folder = output.folder(Path(f"{scene.stem}-results"), reads=file.inputs, **origin(file))
     with folder as new:
-        with blamed_on(scene), progress(f"pressing {len(file.scene):,} asperities"):
+        with blamed_on(scene), common.progress(f"pressing {len(file.scene):,} asperities"):
             contact = file.press()
         for caution in file.cautions(contact):  # before computations that may be long, or fail
-            say_aside("warning", caution)
-        with blamed_on(scene), progress("computing"):
+            common.say_aside("warning", caution)
+        with blamed_on(scene), common.progress("computing"):
             results = file.compute(contact)
             page = slider_html(contact, results[0].lines()) if output.html else None
             new.results(results, figures=not output.no_figures)
             new.text("scene.toml", file.text)
             if page is not None:
                 new.text("slider.html", page)
-        prove = partial(prove_results, results, partial(say_aside, "warning"))
+        prove = partial(prove_results, results, partial(common.say_aside, "warning"))
         proof = output.proved(prove, new.path)
-    status = output.say_results(results, written(new))
+    status = output.say_results(results, common.written(new))
     return output.say_proof(proof, new.folder, status)
 
 
@@ -81,18 +69,15 @@ def _part(context: Any, option: Any, value: str | None) -> tuple[int, int] | Non
 
 
 @click.command()
-@click.argument("sweep", type=PATH, required=False)
-@click.option("--part", metavar="K/N", callback=_part,
-              help="Compute the K-th of N shares of the scenes.")  # fmt: skip
-@click.option("--resume", is_flag=True, help="Continue an interrupted sweep.")
-@click.option("--scheduler", metavar="ADDRESS",
-              help='Dask scheduler: tcp://..., a file, or "local".')  # fmt: skip
-@click.option("--workers", metavar="N", type=click.IntRange(1),
-              help="Number of processes; default: all cores.")  # fmt: skip
-@click.option("--summary", metavar="DIR", type=PATH, help="Print quantiles of the results in DIR.")
-@output_options("out", "force", "as_json")
+@click.argument("sweep", type=common.PATH, required=False)
+@common.option("--part K/N", "Compute the K-th of N shares of the scenes.", callback=_part)
+@common.option("--resume", "Continue an interrupted sweep.")
+@common.option("--scheduler ADDRESS", 'Dask scheduler: tcp://..., a file, or "local".')
+@common.option("--workers N", "Number of processes; default: all cores.", click.IntRange(1))
+@common.option("--summary DIR", "Print quantiles of the results in DIR.", common.PATH)
+@common.output_options("out", "force", "as_json")
 def sweep(
-    output: Output,
+    output: common.Output,
     sweep: Path | None,
     summary: Path | None,
     workers: int | None,
@@ -125,7 +110,7 @@ def sweep(
 
 def _swept(
     sweep: Path,
-    output: Output,
+    output: common.Output,
     workers: int | None = None,
     scheduler: str | None = None,
     **options: Any,
@@ -135,49 +120,49 @@ def _swept(
     from convexrough.sweeps.sweep import Processes, dask, run
 
     folder = output.out or Path(f"{sweep.stem}-sweep")
-    with progress("reading the first scene"):
+    with common.progress("reading the first scene"):
         plan = plan_of(sweep)
     try:
         pool = Processes(workers) if scheduler is None else dask(scheduler)
-        with progress(str(sweep)), pool as executor:
+        with common.progress(str(sweep)), pool as executor:
             table, did = run(plan, executor, out=folder, overwrite=output.force, **options)
     except KeyboardInterrupt:
-        say_aside("interrupted", progress_kept(folder, plan))
-        return INTERRUPTED
+        common.say_aside("interrupted", progress_kept(folder, plan))
+        return common.INTERRUPTED
     except WorkerError as error:
-        say_aside("error", str(error), progress_kept(folder, plan))
-        return SOLVER_FAILED
+        common.say_aside("error", str(error), progress_kept(folder, plan))
+        return common.SOLVER_FAILED
     said = summarise(table, **did)
     output.say(said, describe(said), (*failures(table), *cautions(table)))
     return _status(said)
 
 
-def _say_summary(folder: Path, output: Output) -> int:
+def _say_summary(folder: Path, output: common.Output) -> int:
     from convexrough.record import rows_of
     from convexrough.sweeps import report
     from convexrough.sweeps.table import open_sweep
 
     table = open_sweep(folder)
-    with progress(f"reading {folder}"):
+    with common.progress(f"reading {folder}"):
         said = report.summarise(table)
         found = table.quantiles(at=report.AT)
     lines = [*report.describe(said), "", *report.describe_quantiles(found)]
     if output.out is not None:
-        with progress("writing results"), output.folder(output.out) as new:
+        with common.progress("writing results"), output.folder(output.out) as new:
             left_out = report.write_summary(new, table, found)
-        lines += [*written(new), *left_out]
+        lines += [*common.written(new), *left_out]
     output.say({**said, "quantiles": rows_of(found)}, lines)
     return _status(said)
 
 
 def _status(summary: dict[str, Any]) -> int:
     if summary["sweep"]["failed"]:
-        return SOLVER_FAILED
-    return NOT_CERTIFIED if summary["sweep"]["undecided"] else DONE
+        return common.SOLVER_FAILED
+    return common.NOT_CERTIFIED if summary["sweep"]["undecided"] else common.DONE
 
 
 @click.command()
-@click.argument("scene", type=PATH)
+@click.argument("scene", type=common.PATH)
 def new(scene: Path) -> int:
     """Write an example of a scene file, with comments.
 
@@ -188,14 +173,13 @@ def new(scene: Path) -> int:
     template = files("convexrough.run").joinpath("new_scene.toml").read_text(encoding="utf-8")
     if scene.exists() or scene.is_symlink():
         raise FileError(f"{scene}: exists already; name another file")
-    with replacing(scene) as temporary:
-        temporary.write_text(template, encoding="utf-8")
+    write_text(scene, template)
     click.echo(f"written  {scene}")
-    return DONE
+    return common.DONE
 
 
 @click.command()
-@click.argument("proof", type=PATH)
+@click.argument("proof", type=common.PATH)
 def check(proof: Path) -> int:
     """Check the claims of a proof file, in exact arithmetic.
 

@@ -6,34 +6,21 @@ from pathlib import Path
 
 import click
 
-from convexrough.cli.output import (
-    DONE,
-    NOT_CERTIFIED,
-    OPTIONS,
-    PATH,
-    SOLVER_FAILED,
-    Output,
-    output_options,
-    progress,
-    solver_option,
-    written,
-)
+from convexrough.cli import common
 from convexrough.errors import FileError, blamed_on
 
 
 @click.command()
-@click.argument("scene", type=PATH)
-@solver_option
-@click.option("--within", metavar="PART", type=click.FloatRange(0, min_open=True), default=1e-3,
-              show_default=True,
-              help="Largest difference allowed between a load and that of Newton's method, as a "
-              "fraction of the largest load.")  # fmt: skip
-@click.option("--log", metavar="FILE", type=PATH,
-              help="Write the iterations of Newton's method and Clarabel to a CSV file."
-              )  # fmt: skip
-@output_options("as_json")
+@click.argument("scene", type=common.PATH)
+@common.solver_option
+@common.option("--within PART", "Largest difference allowed between a load and that of Newton's "
+               "method, as a fraction of the largest load.",
+               click.FloatRange(0, min_open=True), default=1e-3, show_default=True)  # fmt: skip
+@common.option("--log FILE", "Write the iterations of Newton's method and Clarabel to a CSV file.",
+               common.PATH)  # fmt: skip
+@common.output_options("as_json")
 def compare(
-    output: Output, scene: Path, solvers: tuple[str, ...], within: float, log: Path | None
+    output: common.Output, scene: Path, solvers: tuple[str, ...], within: float, log: Path | None
 ) -> int:
     """Solve a scene with all solvers; compare loads, proofs, times.
 
@@ -56,7 +43,7 @@ def compare(
     if log is not None and log.exists():
         raise FileError(f"{log}: exists already; name another file")
     file = read_scene(scene)
-    with blamed_on(scene), progress(f"pressing on {len(file.scene)} asperities"):
+    with blamed_on(scene), common.progress(f"pressing on {len(file.scene)} asperities"):
         comparison = compare_solvers(
             file.scene,
             approach=file.approach,
@@ -72,22 +59,20 @@ def compare(
     output.say(summary, lines, report.comparison_warnings(summary))
     outcomes = {entry.outcome for entry in comparison.entries}
     if "failed" in outcomes and not comparison.contradictions:
-        return SOLVER_FAILED
-    wrong = comparison.contradictions or summary["disagreeing"]
-    if wrong or "refused" in outcomes or not comparison.certified:
-        return NOT_CERTIFIED
-    return DONE
+        return common.SOLVER_FAILED
+    wrong = comparison.contradictions or summary["disagreeing"] or "refused" in outcomes
+    return common.NOT_CERTIFIED if wrong or not comparison.certified else common.DONE
 
 
 @click.command()
-@click.argument("scene", type=PATH)
-@click.option("--format", "formats", type=click.Choice(["cbf", "json", "mps", "npz"]),
-              multiple=True, help="Write only this format; may be repeated.")  # fmt: skip
-@click.option("--bristles", metavar="M", type=click.IntRange(1), default=64, show_default=True,
-              help="Bristles per asperity in the quadratic program (HiGHS is slow above 16).",
-              )  # fmt: skip
-@output_options("out", "force", "as_json")
-def export(output: Output, scene: Path, formats: tuple[str, ...], bristles: int) -> int:
+@click.argument("scene", type=common.PATH)
+@common.option("--format", "Write only this format; may be repeated.",
+               click.Choice(("cbf", "json", "mps", "npz")), name="formats", multiple=True
+               )  # fmt: skip
+@common.option("--bristles M", "Bristles per asperity in the quadratic program (HiGHS is slow "
+               "above 16).", click.IntRange(1), default=64, show_default=True)  # fmt: skip
+@common.output_options("out", "force", "as_json")
+def export(output: common.Output, scene: Path, formats: tuple[str, ...], bristles: int) -> int:
     """Write a scene as cone and quadratic programs for other solvers.
 
     The cone program, which is equivalent to the contact law, and its dual, which bounds the energy
@@ -102,7 +87,7 @@ def export(output: Output, scene: Path, formats: tuple[str, ...], bristles: int)
     from convexrough.run.scene_file import read_scene
 
     file = read_scene(scene)
-    writing = progress(f"writing programs of {len(file.scene):,} asperities")
+    writing = common.progress(f"writing programs of {len(file.scene):,} asperities")
     folder = output.folder(Path(f"{scene.stem}-programs"), reads=file.inputs)
     with folder as new, blamed_on(scene), writing:
         new.files, index = write_programs(
@@ -120,19 +105,19 @@ def export(output: Output, scene: Path, formats: tuple[str, ...], bristles: int)
         for name, about in index["programs"].items()
     ]
     left_out = (f"{name}: left out: {reason}" for name, reason in index["left_out"].items())
-    output.say(index, [*lines, *written(new)], left_out)
-    return DONE
+    output.say(index, [*lines, *common.written(new)], left_out)
+    return common.DONE
 
 
 @click.command()
-@click.option("--list", "show_list", is_flag=True, help="List the cases (default).")
-@click.option("--export", metavar="DIR", type=PATH, help="Folder for programs and answers.")
-@click.option("--profile", is_flag=True, help="Time every solver and check its solutions.")
-@solver_option
+@common.option("--list", "List the cases (default).", name="show_list")
+@common.option("--export DIR", "Folder for programs and answers.", common.PATH)
+@common.option("--profile", "Time every solver and check its solutions.")
+@common.solver_option
 @click.argument("names", nargs=-1)
-@output_options("force", "as_json")
+@common.output_options("force", "as_json")
 def gallery(
-    output: Output,
+    output: common.Output,
     show_list: bool,
     export: Path | None,
     profile: bool,
@@ -161,40 +146,38 @@ def gallery(
         chosen = [solver_named(each) for each in solvers]
         from convexrough.bench.profile import profile_of
 
-        with progress("timing"):
+        with common.progress("timing"):
             found = profile_of(chosen or None, cases=wanted)
-        rows, reported = found.rows(), []
-        cells: list[list[str]] = [list(rows[0])]
-        for row, each in zip(rows, found.outcomes, strict=True):
-            cells.append([f"{x:.0%}" if isinstance(x, float) else str(x) for x in row.values()])
-            outcomes = dict(zip(found.cases, each.tolist(), strict=True))
-            reported.append({**row, "outcomes": outcomes})
-        output.say({"profile": reported}, aligned(cells, left=1))
-        return DONE
+        table = found.rows()
+        cells = [[f"{x:.0%}" if isinstance(x, float) else x for x in row.values()] for row in table]
+        reported = [
+            row | {"outcomes": dict(zip(found.cases, each.tolist(), strict=True))}
+            for row, each in zip(table, found.outcomes, strict=True)
+        ]
+        output.say({"profile": reported}, aligned([list(table[0]), *cells], left=1))
+        return common.DONE
     cases = [wing.case(name) for name in wanted]
     lines = []
     if show_list or export is None:
-        heading = ["case", "family", "what is hard", "asperities", "touching"]
-        lines_of_cases = [
-            [case.name, case.family, case.why, str(len(case)), str(case.touching.sum())]
-            for case in cases
-        ]
-        lines = aligned([heading, *lines_of_cases], left=3)
+        rows = [[it.name, it.family, it.why, len(it), it.touching.sum()] for it in cases]
+        lines = aligned(
+            [["case", "family", "what is hard", "asperities", "touching"], *rows], left=3
+        )
     summary = {case.name: {"family": case.family, "why": case.why} for case in cases}
     if export is not None:
-        with output.folder(export) as new, progress("writing"):
+        with output.folder(export) as new, common.progress("writing"):
             for name, text in exported(wanted):
                 new.text(name, text)
         lines += [f"{len(wanted)} cases, {len(new.files)} files, written to {export}"]
     output.say({"cases": summary}, lines)
-    return DONE
+    return common.DONE
 
 
 @click.command()
-@output_options("out", "no_figures", "force", "as_json")
-@click.option("--quick", is_flag=True, help="Use fewer and smaller scenes.")
-@click.option("--page", metavar="FILE", type=PATH, help="Also update this Markdown page.")
-def bench(output: Output, quick: bool, page: Path | None) -> int:
+@common.output_options("out", "no_figures", "force", "as_json")
+@common.option("--quick", "Use fewer and smaller scenes.")
+@common.option("--page FILE", "Also update this Markdown page.", common.PATH)
+def bench(output: common.Output, quick: bool, page: Path | None) -> int:
     """Measure time and error of solvers for many scene sizes.
 
     Results go to the folder bench-results unless --out names another. With --page, the command also
@@ -205,16 +188,16 @@ def bench(output: Output, quick: bool, page: Path | None) -> int:
 
     if page is not None:
         rows.split_page(page)  # a page without markers is refused before anything is computed
-    with output.folder(Path("bench-results")) as new, progress("measuring"):
+    with output.folder(Path("bench-results")) as new, common.progress("measuring"):
         found = suite.run(quick=quick)
         suite.write_bench(new, found, figures=not output.no_figures, page=page)
-    output.say(found.summary(), [*rows.describe(found), *written(new)])
-    return DONE
+    output.say(found.summary(), [*rows.describe(found), *common.written(new)])
+    return common.DONE
 
 
 @click.command()
-@output_options(*(name for name in OPTIONS if name != "proof"))
-def paper(output: Output) -> int:
+@common.output_options(*(name for name in common.OPTIONS if name != "proof"))
+def paper(output: common.Output) -> int:
     """Reproduce the example of Dini and Hills (2009).
 
     Tables and figures go to the folder paper-results unless --out names another.
@@ -224,7 +207,7 @@ def paper(output: Output) -> int:
     from convexrough.paper.figures import figure_data, paper_figures
     from convexrough.plots.slider import slider_html
 
-    with output.folder(Path("paper-results")) as new, progress("reproducing the paper"):
+    with output.folder(Path("paper-results")) as new, common.progress("reproducing the paper"):
         found = example.results()
         states = PaperStates(found[0].contact)
         comparison = example.compare(states)
@@ -235,4 +218,4 @@ def paper(output: Output) -> int:
             new.text("slider.html", slider_html(states.contact, found[0].lines()))
         more = {"paper": comparison}
         new.results(found, figures=False, more=more)
-    return output.say_results(found, ["", *example.table(comparison), *written(new)], more)
+    return output.say_results(found, ["", *example.table(comparison), *common.written(new)], more)

@@ -10,24 +10,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from convexrough.cli.output import (
-    DONE,
-    NOT_CERTIFIED,
-    PATH,
-    Output,
-    output_options,
-    progress,
-    say_aside,
-    written,
-)
+from convexrough.cli import common
 from convexrough.errors import FileError, InputError, blamed_on
 
 if TYPE_CHECKING:
     from convexrough.contact import Contact
-    from convexrough.run.results import Writer
     from convexrough.scene.asperities import Asperities
     from convexrough.surface import Surface
-    from convexrough.surface.report import Scanned
 
 
 class Pressing(NamedTuple):
@@ -41,17 +30,16 @@ class Pressing(NamedTuple):
 
     def check(self) -> None:
         """Raise UsageError if options exclude each other, or if a required one is missing."""
-        scene, radius, approach, load, modulus = self
-        others = any(each is not None for each in self[1:])
-        if scene is not None and others:
-            raise click.UsageError("--scene excludes --radius, --approach, --load and --modulus.")
-        if scene is None and others:
-            if radius is None:
-                raise click.UsageError("--approach, --load and --modulus need --radius.")
-            if (approach is None) == (load is None):
-                raise click.UsageError("--radius needs exactly one of --approach and --load.")
-            if (load is None) != (modulus is None):
-                raise click.UsageError("--load needs --modulus, and --modulus needs --load.")
+        scene, radius, approach, load, modulus = (each is not None for each in self)
+        wrong = {
+            "--scene excludes --radius, --approach, --load and --modulus.": scene,
+            "--approach, --load and --modulus need --radius.": not radius,
+            "--radius needs exactly one of --approach and --load.": approach == load,
+            "--load needs --modulus, and --modulus needs --load.": load != modulus,
+        }
+        if radius or approach or load or modulus:
+            for said in (said for said, is_so in wrong.items() if is_so):
+                raise click.UsageError(said)
 
     def of(
         self, surface: Surface, prune: float, fit: int
@@ -64,9 +52,8 @@ class Pressing(NamedTuple):
             if unit and surface.unit:
                 surface = surface.to_unit(unit)
             file = read_scene(self.scene, asperities=surface.summits(prune, fit))
-            return surface, lambda it: replace(
-                file, scene=replace(file.scene, asperities=it)
-            ).press()
+            on = partial(replace, file.scene)
+            return surface, lambda it: replace(file, scene=on(asperities=it)).press()
         if self.radius is None:
             return surface, None
         from convexrough.contact import press
@@ -80,7 +67,7 @@ class Pressing(NamedTuple):
         return surface, lambda it: pressed(base(asperities=it))
 
 
-def _pixel(given: str | None) -> float | tuple[float, ...] | None:
+def _pixel(context: Any, option: Any, given: str | None) -> float | tuple[float, ...] | None:
     if given is None:
         return None
     try:
@@ -92,34 +79,30 @@ def _pixel(given: str | None) -> float | tuple[float, ...] | None:
 
 
 @click.command()
-@click.argument("surface", type=PATH)
-@click.option("--scene", metavar="SCENE", type=PATH, help="Press as in this scene file.")
-@click.option("--radius", metavar="R", type=float,
-              help="Radius of the sphere, in the unit of the map; not with --scene.")  # fmt: skip
-@click.option("--approach", metavar="D", type=float,
-              help="Prescribed approach, in the unit of the map.")  # fmt: skip
-@click.option("--load", metavar="P", type=float, help="Prescribed load; needs --modulus.")
-@click.option("--modulus", metavar="E", type=float,
-              help="Contact modulus E*, in the unit of load per unit of the map squared."
-              )  # fmt: skip
-@click.option("--pixel", metavar="X[,Y]", callback=lambda *given: _pixel(given[-1]),
-              help="Size of a pixel in --unit, if the file states none.")  # fmt: skip
-@click.option("--unit", metavar="UNIT", help="Unit of pixel and heights: µm, mm, ...")
-@click.option("--height-unit", metavar="UNIT", help="Unit of the heights, if not --unit.")
-@click.option("--detrend", type=click.Choice(["plane", "sphere", "paraboloid", "none"]),
-              default="plane", show_default=True,
-              help="Form to remove before finding summits.")  # fmt: skip
-@click.option("--fill", is_flag=True, help="Fill holes in the map and report them.")
-@click.option("--fit", metavar="N", type=int, default=3, show_default=True,
-              help="Fit a paraboloid to N by N pixels about each maximum; N is odd.")  # fmt: skip
-@click.option("--prune", metavar="PART", type=float, default=0.05, show_default=True,
-              help="Merge hills whose prominence is below the fraction PART of the "
-                   "height range Sz.")  # fmt: skip
-@click.option("--whole", is_flag=True,
-              help="Also press the whole map by boundary elements.")  # fmt: skip
-@output_options("formats", "dpi", "out", "no_figures", "force", "as_json")
+@click.argument("surface", type=common.PATH)
+@common.option("--scene SCENE", "Press as in this scene file.", common.PATH)
+@common.option("--radius R", "Radius of the sphere, in the unit of the map; not with --scene.",
+               float)  # fmt: skip
+@common.option("--approach D", "Prescribed approach, in the unit of the map.", float)
+@common.option("--load P", "Prescribed load; needs --modulus.", float)
+@common.option("--modulus E", "Contact modulus E*, in the unit of load per unit of the map "
+               "squared.", float)  # fmt: skip
+@common.option("--pixel X[,Y]", "Size of a pixel in --unit, if the file states none.",
+               callback=_pixel)  # fmt: skip
+@common.option("--unit UNIT", "Unit of pixel and heights: µm, mm, ...")
+@common.option("--height-unit UNIT", "Unit of the heights, if not --unit.")
+@common.option("--detrend", "Form to remove before finding summits.",
+               click.Choice(("plane", "sphere", "paraboloid", "none")), default="plane",
+               show_default=True)  # fmt: skip
+@common.option("--fill", "Fill holes in the map and report them.")
+@common.option("--fit N", "Fit a paraboloid to N by N pixels about each maximum; N is odd.",
+               int, default=3, show_default=True)  # fmt: skip
+@common.option("--prune PART", "Merge hills whose prominence is below the fraction PART of the "
+               "height range Sz.", float, default=0.05, show_default=True)  # fmt: skip
+@common.option("--whole", "Also press the whole map by boundary elements.")
+@common.output_options("formats", "dpi", "out", "no_figures", "force", "as_json")
 def summits(
-    output: Output,
+    output: common.Output,
     surface: Path,
     prune: float,
     fit: int,
@@ -156,21 +139,34 @@ def summits(
     inputs = {str(each): digest(each) for each in reads}
     said: dict[str, Any] = {"inputs": inputs, "versions": versions()}
     with output.folder(folder, reads=reads, **said) as new:
-        with progress(f"reading {surface}"):
+        with common.progress(f"reading {surface}"):
             scan = read(surface, detrend=None if detrend == "none" else detrend, **options)
             with blamed_on(surface):
                 scan, press = how.of(scan, prune, fit)
                 scanned = report.Scanned.of(scan, prune, fit, press, whole=whole)
-        with progress("writing"):
-            _write(new, scanned, figures=not output.no_figures)
-    lines = [*report.describe_surface(scanned), *written(new)]
-    output.say(report.surface_summary(scanned), lines, report.warnings_about(scanned))
+        summary = report.surface_summary(scanned)
+        with common.progress("writing"):
+            new.tables({"summits": report.summit_columns(scanned.summits)})
+            if scanned.curve is not None:
+                new.tables({"provability": scanned.curve.columns()})
+            new.summary("summary.json", summary)
+            if not output.no_figures:
+                from convexrough.plots.surface import surface_figures  # imports matplotlib
+
+                contact = scanned.contact
+                new.figures(
+                    surface_figures(scan, scanned.maxima, scanned.summits, scanned.curve, contact)
+                )
+    lines = [*report.describe_surface(scanned), *common.written(new)]
+    output.say(summary, lines, report.warnings_about(scanned))
     if scanned.curve is None:
-        say_aside("hint", "use --scene or --radius to press on the summits and choose --prune")
+        common.say_aside(
+            "hint", "use --scene or --radius to press on the summits and choose --prune"
+        )
     if how.scene is not None and (other := _other_table(how.scene, folder / "summits.csv")):
         table = new.files[0].name
-        say_aside("hint", f"{how.scene} reads {other}, which is not {folder / table}")
-    return DONE if scanned.certified else NOT_CERTIFIED
+        common.say_aside("hint", f"{how.scene} reads {other}, which is not {folder / table}")
+    return common.DONE if scanned.certified else common.NOT_CERTIFIED
 
 
 def _other_table(scene: Path, table: Path) -> str:
@@ -181,21 +177,3 @@ def _other_table(scene: Path, table: Path) -> str:
     if layout.pattern != "file" or (scene.parent / layout.path).resolve() == table.resolve():
         return ""
     return layout.path
-
-
-def _write(new: Writer, scanned: Scanned, *, figures: bool) -> None:
-    """Write the table of summits, the results against pruning, a summary and figures."""
-    from convexrough.surface.report import summit_columns, surface_summary
-
-    new.tables({"summits": summit_columns(scanned.summits)})
-    if scanned.curve is not None:
-        new.tables({"provability": scanned.curve.columns()})
-    new.summary("summary.json", surface_summary(scanned))
-    if figures:
-        from convexrough.plots.surface import surface_figures  # matplotlib: only when it draws
-
-        new.figures(
-            surface_figures(
-                scanned.surface, scanned.maxima, scanned.summits, scanned.curve, scanned.contact
-            )
-        )

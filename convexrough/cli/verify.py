@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,16 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from convexrough.atomic import write_text
-from convexrough.cli.output import (
-    DONE,
-    NOT_CERTIFIED,
-    PATH,
-    Output,
-    output_options,
-    progress,
-    say_aside,
-    written,
-)
+from convexrough.cli import common
 from convexrough.errors import (
     ConvexroughError,
     FileError,
@@ -34,7 +25,6 @@ if TYPE_CHECKING:
     from convexrough.arrays import Array
     from convexrough.normal.claims import Claim
     from convexrough.proof import Proof
-    from convexrough.run.results import Writer
     from convexrough.run.scene_file import SceneFile
     from convexrough.verdict.claims import Manner
 
@@ -44,17 +34,15 @@ def _manner(column: Sequence[str], scale: Sequence[str], sign: str, **options: A
     from convexrough.tabular.roles import named_columns
     from convexrough.verdict.claims import Manner
 
-    names = ("load", "pressure", "area", "x", "y", "force", "status", "index")
+    numbers = ("load", "pressure", "area", "x", "y", "force")
     factors = {}
     for name, factor in _pairs("--scale", scale).items():
-        try:
+        with suppress(ValueError):
             factors[name] = finite("--scale", float(factor))
-        except ValueError:
-            factors[name] = 0.0
-        if name not in names[:-2] or not factors[name]:
-            expected = f"NAME=FACTOR, a number but 0, where NAME is one of {', '.join(names[:-2])}"
+        if name not in numbers or not factors.get(name):
+            expected = f"NAME=FACTOR, a number but 0, where NAME is one of {', '.join(numbers)}"
             raise InputError("--scale", found=f"{name}={factor}", expected=expected)
-    columns = named_columns("--column", _pairs("--column", column), names)
+    columns = named_columns("--column", _pairs("--column", column), (*numbers, "status", "index"))
     return Manner(columns=columns, scales=factors, sign=int(sign), **options)
 
 
@@ -70,39 +58,31 @@ def _pairs(option: str, given: Sequence[str]) -> dict[str, str]:
 
 
 @click.command()
-@click.argument("scene", type=PATH)
-@click.argument("loads", type=PATH)
-@click.option("--within", metavar="PART", type=float, default=0.01, show_default=True,
-              help="Largest error allowed of a load or shear force, as a fraction of the largest "
-              "one. If their sum is prescribed, its error counts as a fraction of it."
-              )  # fmt: skip
-@click.option("--floor", metavar="X", type=float, default=0.0,
-              help="Treat loads from -X to X as zero: their asperities are claimed to be open."
-              )  # fmt: skip
-@click.option("--tolerance", metavar="X", type=float,
-              help="Largest distance of a position in the file from its asperity; default 1 % of "
-              "the smallest distance of two asperities.")  # fmt: skip
-@click.option("--column", metavar="NAME=COLUMN", multiple=True,
-              help="Read NAME (load, x, index, ...) from this column: a header, or a number from 1."
-              )  # fmt: skip
-@click.option("--scale", metavar="NAME=FACTOR", multiple=True,
-              help="Multiply the numbers of the column NAME by FACTOR.")  # fmt: skip
-@click.option("--sign", type=click.Choice(["1", "-1"]), default="1",
-              help="Use -1 if compression is negative in the file.")  # fmt: skip
-@click.option("--missing-open", is_flag=True,
-              help="Asperities without a row are claimed to be open.")  # fmt: skip
-@click.option("--nodes", is_flag=True,
-              help="Rows are nodes; sum their forces by asperity.")  # fmt: skip
-@click.option("--shear", metavar="FORCES", type=PATH,
-              help="Also check the shear forces in this file, after the total shear force has "
-              "grown from 0 to the Q of --shear-force.")  # fmt: skip
-@click.option("--shear-force", metavar="Q", type=float,
-              help="Prescribed sum of the forces in FORCES.")  # fmt: skip
-@click.option("--explain", is_flag=True, help="Report how the files are read, and stop.")
-@click.option("--junit", metavar="FILE", type=PATH, help="Write the findings as JUnit XML.")
-@output_options("proof", "out", "force", "as_json")
+@click.argument("scene", type=common.PATH)
+@click.argument("loads", type=common.PATH)
+@common.option("--within PART", "Largest error allowed of a load or shear force, as a fraction of "
+               "the largest one. If their sum is prescribed, its error counts as a fraction of it.",
+               float, default=0.01, show_default=True)  # fmt: skip
+@common.option("--floor X", "Treat loads from -X to X as zero: their asperities are claimed to be "
+               "open.", float, default=0.0)  # fmt: skip
+@common.option("--tolerance X", "Largest distance of a position in the file from its asperity; "
+               "default 1 % of the smallest distance of two asperities.", float)  # fmt: skip
+@common.option("--column NAME=COLUMN", "Read NAME (load, x, index, ...) from this column: a "
+               "header, or a number from 1.", multiple=True)  # fmt: skip
+@common.option("--scale NAME=FACTOR", "Multiply the numbers of the column NAME by FACTOR.",
+               multiple=True)  # fmt: skip
+@common.option("--sign", "Use -1 if compression is negative in the file.",
+               click.Choice(["1", "-1"]), default="1")  # fmt: skip
+@common.option("--missing-open", "Asperities without a row are claimed to be open.")
+@common.option("--nodes", "Rows are nodes; sum their forces by asperity.")
+@common.option("--shear FORCES", "Also check the shear forces in this file, after the total shear "
+               "force has grown from 0 to the Q of --shear-force.", common.PATH)  # fmt: skip
+@common.option("--shear-force Q", "Prescribed sum of the forces in FORCES.", float)
+@common.option("--explain", "Report how the files are read, and stop.")
+@common.option("--junit FILE", "Write the findings as JUnit XML.", common.PATH)
+@common.output_options("proof", "out", "force", "as_json")
 def verify(
-    output: Output,
+    output: common.Output,
     scene: Path,
     loads: Path,
     *,
@@ -163,10 +143,10 @@ def verify(
         if explain:
             lines = [line for each in read for line in (f"{each.path}:", *each.explained, "")]
             output.say({"read": [*lines, *about]}, [*lines, *about])
-            return DONE
+            return common.DONE
         inputs: list[str | Path] = [*file.inputs, *(each.path for each in read)]
         new = stack.enter_context(output.folder(output.out, reads=inputs)) if output.out else None
-        with progress(f"checking the loads of {len(file.scene):,} asperities"):
+        with common.progress(f"checking the loads of {len(file.scene):,} asperities"):
             with blamed_on(scene):
                 problem = file.problem()
             total = shear_force or 0.0
@@ -174,11 +154,13 @@ def verify(
         of_loads = claims[0]
         normal = judged_loads(of_loads.certificate, of_loads.values)
         summary = headed(normal=normal) | report.verdict_summary(claims)
-        holds = all(claim.holds for claim in claims)
-        found = of_loads.solution
         claimed = np.where(of_loads.claimed, of_loads.values, 0.0)
         if new is not None:
-            _write(new, summary, claims)
+            from convexrough.plots.verdict import verdict_figures  # imports matplotlib
+
+            new.summary("verdict.json", summary)
+            new.tables({"verdict": report.asperity_columns(claims)})
+            new.figures(verdict_figures(*claims))
         prove = partial(_proof, file, claimed, of_loads, scene)
         proof = output.proved(prove, new.path if new else Path())
     if junit is not None:
@@ -189,17 +171,18 @@ def verify(
     scaled = of_loads.total_prescribed not in (None, of_loads.total_given)
     scaling = "; gaps and energy after scaling them to the prescribed total" if scaled else ""
     lines += ["", f"certificate of the given loads{scaling}", *describe(normal, file.scene.units)]
-    lines += written(new) if new else []
+    lines += common.written(new) if new else []
     output.say(summary, lines)
-    for claim in claims:
-        for hint in claim.hints():
-            say_aside("hint", hint)
+    for hint in (hint for claim in claims for hint in claim.hints()):
+        common.say_aside("hint", hint)
+    found = of_loads.solution
     for caution in cautions_about(file.scene, claimed if found is None else found.loads):
-        say_aside("warning", caution)
-    if not holds:
-        reasons = filter(None, map(report.reason, claims))
-        say_aside("warning", f"not certified: {', '.join(reasons)}")
-    return output.say_proof(proof, output.out or Path(), DONE if holds else NOT_CERTIFIED)
+        common.say_aside("warning", caution)
+    status = common.DONE
+    if not all(claim.holds for claim in claims):
+        status, reasons = common.NOT_CERTIFIED, filter(None, map(report.reason, claims))
+        common.say_aside("warning", f"not certified: {', '.join(reasons)}")
+    return output.say_proof(proof, output.out or Path(), status)
 
 
 @contextmanager
@@ -213,15 +196,6 @@ def _reported(path: Path | None, files: str) -> Iterator[None]:
         if path is not None:
             write_text(path, junit(error, files))
         raise
-
-
-def _write(new: Writer, summary: dict[str, Any], claims: Sequence[Claim]) -> None:
-    from convexrough.plots.verdict import verdict_figures  # matplotlib: only when it draws
-    from convexrough.verdict.report import asperity_columns
-
-    new.summary("verdict.json", summary)
-    new.tables({"verdict": asperity_columns(claims)})
-    new.figures(verdict_figures(*claims))
 
 
 def _proof(file: SceneFile, loads: Array, claim: Claim, scene: Path) -> Proof:

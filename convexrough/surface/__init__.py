@@ -1,25 +1,15 @@
 """Asperities from measured surfaces: reading, detrending, summits, and comparison with theory."""
 
-from convexrough.surface.boundary_elements import Whole, press_whole
-from convexrough.surface.moments import Moments
-from convexrough.surface.provability import Provability, crowded, model_errors, provability
-from convexrough.surface.reading import read
-from convexrough.surface.self_affine import self_affine, self_affine_moments
-from convexrough.surface.summits import Origin, Summits
-from convexrough.surface.surface import Surface
-
-__all__ = [
-    "Moments",
-    "Origin",
-    "Provability",
-    "Summits",
-    "Surface",
-    "Whole",
-    "crowded",
-    "model_errors",
-    "press_whole",
-    "provability",
-    "read",
-    "self_affine",
-    "self_affine_moments",
-]
+from convexrough.surface.boundary_elements import Whole as Whole
+from convexrough.surface.boundary_elements import press_whole as press_whole
+from convexrough.surface.pixels import Moments as Moments
+from convexrough.surface.provability import Provability as Provability
+from convexrough.surface.provability import crowded as crowded
+from convexrough.surface.provability import model_errors as model_errors
+from convexrough.surface.provability import provability as provability
+from convexrough.surface.reading import read as read
+from convexrough.surface.self_affine import self_affine as self_affine
+from convexrough.surface.self_affine import self_affine_moments as self_affine_moments
+from convexrough.surface.summits import Origin as Origin
+from convexrough.surface.summits import Summits as Summits
+from convexrough.surface.surface import Surface as Surface

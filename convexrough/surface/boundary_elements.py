@@ -39,8 +39,7 @@ def half_space(
 ) -> HalfSpace:
     """The operator from pressures to the sum of the normal displacements of both bodies.
 
-    Unit pressure on a pixel displaces a point by (1 / (pi E*)) times the integral of 1/r over the
-    pixel, with the distance r from this point. Love (1929) gives this integral in closed form.
+    It contains the integral of 1 / (pi E* r) over a pixel, by Love (1929).
     """
 
     def influence(i: Indices, j: Indices, _: Array) -> list[Array]:
@@ -66,10 +65,8 @@ def touch(
 ) -> Array:
     """Pressures that solve the contact law, by conjugate gradients on the touching pixels.
 
-    This is the method of Polonsky and Keer (Wear 231, 1999) at a given approach. Each step sets
-    negative pressures to 0, and adds pixels with negative gap to the touching ones. After such an
-    addition the search directions restart. The method ends if |g| <= accuracy * max h on pixels
-    with p > 0, and g >= -accuracy * max h on pixels with p = 0 < h.
+    This is the method of Polonsky and Keer (Wear 231, 1999) at a given approach. It ends if
+    |g| <= accuracy * max h on pixels with p > 0, and g >= -accuracy * max h where p = 0 < h.
     """
     allowed = overlap > 0
     pressure = np.where(allowed, start, 0.0)
@@ -89,7 +86,7 @@ def touch(
         pressure = np.maximum(trial, 0.0)
         entering = allowed & (pressure == 0) & (gap < 0)
         pressure[entering] = -step * gap[entering]
-        previous = np.inf if entering.any() else square
+        previous = np.inf if entering.any() else square  # infinite: the directions restart
         if entering.any() or trial.min() < 0:
             gap = displacement(pressure) - overlap
         else:
@@ -172,11 +169,9 @@ def press_whole(surface: Surface, contact: Contact) -> Whole:
         raise InputError("contact", found=found, expected=expected)
     pressures, load = _pressed(surface, contact, 1)
     touching = pressures > 0
-    edges = (touching[0], touching[-1], touching[:, 0], touching[:, -1])
-    if any(edge.any() for edge in edges):
-        found = "contact at the edge of the map"
+    if touching.sum() > touching[1:-1, 1:-1].sum():
         expected = "a larger map, a smaller approach or load, or no --whole"
-        raise InputError("map", found=found, expected=expected)
+        raise InputError("map", found="contact at the edge of the map", expected=expected)
     row, column = np.nonzero(touching)
     x, y = _places(surface, 1)
     area = surface.pixel[0] * surface.pixel[1]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -14,30 +14,20 @@ from convexrough.errors import InputError
 Trend = Literal["plane", "sphere", "paraboloid"]
 TRENDS: tuple[Trend, ...] = ("plane", "sphere", "paraboloid")
 
-#: Largest number of Gauss-Newton steps to the best sphere, and relative size of the last step.
-STEPS, ENOUGH = 50, 1e-12
-
-#: The measured pixels do not determine a form if the least eigenvalue of the correlation matrix of
-#: its terms is below this.
-ALIKE = 1e-10
+#: Largest number of Gauss-Newton steps to the best sphere; relative size of the last step; least
+#: eigenvalue of the correlation matrix of the terms with which pixels determine a form.
+STEPS, ENOUGH, ALIKE = 50, 1e-12, 1e-10
 
 
 @dataclass(frozen=True, repr=False)
 class Removed:
-    """A form that was subtracted from a map.
-
-    kind      : "plane", "sphere" or "paraboloid" (of a cylinder or an ellipsoid)
-    height, slopes : [length] height, and slopes along x and y, at the middle of the map
-    curvatures : [1/length] principal curvatures, the larger first; positive for a hill. They are
-        equal for a sphere, and 0 for a plane
-    angle     : [degrees] direction of the axis of the first curvature, from x towards y
-    """
+    """A form that was subtracted from a map."""
 
     kind: Trend
-    height: float
-    slopes: tuple[float, float]
-    curvatures: tuple[float, float] = (0.0, 0.0)
-    angle: float = 0.0
+    height: float  # [length] at the middle of the map
+    slopes: tuple[float, float]  # along x and y at the middle of the map
+    curvatures: tuple[float, float] = (0.0, 0.0)  # [1/length] the larger first; of a hill positive
+    angle: float = 0.0  # [degrees] from x towards y, of the axis of the first curvature
 
     @property
     def curvature(self) -> float:
@@ -60,8 +50,7 @@ class Removed:
     def scaled(self, scale: float) -> Removed:
         """The same form with all lengths multiplied by `scale`."""
         first, second = self.curvatures
-        return Removed(self.kind, self.height * scale, self.slopes,
-                       (first / scale, second / scale), self.angle)  # fmt: skip
+        return replace(self, height=self.height * scale, curvatures=(first / scale, second / scale))
 
     def __repr__(self) -> str:
         tilt = f"slopes {self.slopes[0]:.3g} and {self.slopes[1]:.3g}"
@@ -84,11 +73,8 @@ def principal(tensor: Array) -> tuple[tuple[float, float], float]:
 def fitted(heights: Array, pixel: tuple[float, float], kind: Trend) -> tuple[Removed, Array]:
     """The form of this kind that fits best by least squares, and its heights (ny, nx).
 
-    The form is fitted to the pixels that are not holes (nan). Its heights are nan in the holes.
-    docs/theory/surfaces.md, "Removing the form", derives the method. In the code, lengths are
-    divided by about half the longer side of the map.
-
-    Raises InputError if no sphere fits, or if the heights do not determine the form.
+    Holes (nan) do not count, and stay holes. docs/theory/surfaces.md, "Removing the form", derives
+    the method. In the code, lengths are divided by about half the longer side of the map.
     """
     known = ~np.isnan(heights)
     rows, columns = heights.shape

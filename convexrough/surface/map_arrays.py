@@ -1,26 +1,24 @@
-"""Maps in files of arrays (.npy, .npz, .mat) and of instruments."""
+"""Maps in files of arrays (.npy, .npz, .mat) and of instruments; heights on a regular grid."""
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from warnings import catch_warnings
 
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.arrays import Array
+from convexrough.arrays import Array, Indices
 from convexrough.errors import FileError, InputError
-from convexrough.surface.height_grid import HeightGrid, placed, refuse_other
 from convexrough.surface.surface import checked_pixel
 from convexrough.tabular.arrays import named_arrays
 
-#: Names that the array of heights may have in a file with several arrays.
+#: Names of arrays of an .npz or .mat file: of the heights; of the pixel and the units; and parts of
+#: names of other arrays that probably change the meaning of the heights, which are errors.
 HEIGHTS = ("heights", "height", "z")
-
-#: STATED: arrays of an .npz or .mat file that state the pixel and the units. SCALES: parts of names
-#: of other arrays that probably change the meaning of the heights; such arrays are errors.
 STATED = ("pixel", "unit", "height_unit")
 SCALES = re.compile(
     "unit|scale|factor|multipl|gain|offset|lsb|pixel|spacing|step|resol|calib|^d[xyz]$", re.I
@@ -29,19 +27,35 @@ SCALES = re.compile(
 #: Largest relative difference of a stated pixel from the steps of x and y, which may be rounded.
 ROUNDED = 1e-3
 
+#: Largest accepted distance of a coordinate from the grid, in pixels.
+OFF_GRID = 0.05
+
+
+class HeightGrid(NamedTuple):
+    """The heights in a file, and what the file states about them."""
+
+    heights: Array  # nan where the file states none; marks of holes such as -9999 are unchanged
+    pixel: tuple[float, float] | None = None  # along x and y
+    unit: str = ""  # of the pixel
+    height_unit: str = ""
+    comments: tuple[str, ...] = ()  # those that `read` does not understand
+    sheet: str = ""  # the name of the sheet of a workbook, in quotes
+
 
 def arrays_map(path: Path) -> HeightGrid:
     """The map in a .npy, .npz or .mat file."""
     found = {name: np.asarray(values) for name, values in named_arrays(path).items()}
     named = {name.lower(): values for name, values in found.items()} | found
     chosen = "" if "" in found else _chosen(found)
-    others = [
-        name
-        for name, values in found.items()
-        if name != chosen
-        and name.lower() not in (*STATED, "x", "y")
-        and (SCALES.search(name) or _may_change(values, named[chosen]))
-    ]
+
+    def may_change(name: str, values: NDArray[Any]) -> bool:
+        """True for what may change the meaning of heights: a factor, a mask, coordinates."""
+        alike = values.size in (1, named[chosen].size, *named[chosen].shape)
+        numbers = values.dtype.kind in "biufc" and (alike or values.ndim > 1) and values.size > 0
+        return bool(SCALES.search(name)) or numbers
+
+    rest = {it: found[it] for it in found if it != chosen and it.lower() not in (*STATED, "x", "y")}
+    others = [name for name, values in rest.items() if may_change(name, values)]
     if others:
         expected = f"{', '.join(STATED)}, x, y and no other numbers beside heights, in which nan "
         expected += "marks holes"
@@ -56,16 +70,10 @@ def arrays_map(path: Path) -> HeightGrid:
     if not axes and heights.ndim == 2 and heights.shape[1] == 3:  # as in a text file
         *axes, heights = heights.T
     if axes:
-        heights, steps = placed(heights, *axes)
+        heights, steps = on_grid(heights, *axes)
         size = size or steps
         refuse_other(size, steps, ROUNDED, "the steps of x and y")
     return HeightGrid(heights, size, unit, height_unit)
-
-
-def _may_change(values: NDArray[Any], heights: NDArray[Any]) -> bool:
-    """True for numbers that may change the meaning of heights: a factor, a mask, coordinates."""
-    alike = values.size in (1, heights.size, *heights.shape)
-    return values.dtype.kind in "biufc" and (alike or values.ndim > 1) and values.size > 0
 
 
 def _chosen(found: dict[str, NDArray[Any]]) -> str:
@@ -90,9 +98,6 @@ def instrument_map(path: Path, pixel: float | tuple[float, float] | None) -> Hei
     """The heights of the default channel of a file that SurfaceTopography can read.
 
     pixel : size of a pixel, used if the file does not state the size of the map
-
-    Raises FileError if SurfaceTopography cannot read the file or is not installed; InputError if
-    the file contains no map of heights.
     """
     try:
         with catch_warnings(action="ignore", category=ImportWarning):  # MPI is optional
@@ -126,3 +131,74 @@ def instrument_map(path: Path, pixel: float | tuple[float, float] | None) -> Hei
     size: Any = None if sizes is None else tuple(np.divide(sizes, heights.shape).tolist())
     unit = str(topography.unit or "")
     return HeightGrid(heights.T.copy(), size, unit, unit)
+
+
+def refuse_other(
+    said: tuple[float, float], there: tuple[float, float], tolerance: float, why: str
+) -> None:
+    if not np.allclose(said, there, rtol=tolerance, atol=0.0):
+        expected = f"{there[0]:g} by {there[1]:g}, {why}"
+        raise InputError("pixel", found=f"{said[0]:g} by {said[1]:g}", expected=expected)
+
+
+def on_grid(heights: Array, x: Array, y: Array) -> tuple[Array, tuple[float, float]]:
+    """The map, with nan at missing points, and its pixel (dx, dy).
+
+    x, y : coordinates of each height in any order, or x of each column and y of each row
+    """
+    vectors = heights.ndim > 1 and x.ndim == y.ndim == 1
+    shape, y = ((len(y), len(x)), y[:, None]) if vectors else (x.shape, y)
+    if heights.shape != shape or not (vectors or y.shape == shape):
+        found, expected = (" by ".join(map(str, it)) for it in (heights.shape, shape))
+        expected += ", as y and x require" if vectors or x.shape == y.shape else ", for y, too"
+        expected += "; transpose it" if heights.T.shape == shape else ""
+        raise InputError("heights", found=found, expected=expected)
+    (column, dx), (row, dy) = steps("x", x), steps("y", y)
+    shape = int(row.max()) + 1, int(column.max()) + 1
+    if math.prod(shape) > 4 * heights.size + 100:
+        found = f"{heights.size:,} points of a grid of {math.prod(shape):,}"
+        raise InputError("x, y", found=found, expected="a regular grid")
+    place = (row * shape[1] + column).ravel()
+    count = np.bincount(place)
+    if (most := count.max()) > 1:
+        k = np.unravel_index(int(np.argmax(count[place] == most)), heights.shape)
+        at = [f"{np.broadcast_to(each, heights.shape)[k]:g}" for each in (x, y)]
+        found = f"the point {', '.join(at)} {most} times"
+        raise InputError("x, y", found=found, expected="each point once")
+    grid = np.full(shape, np.nan)
+    grid.ravel()[place] = heights.ravel()
+    return grid, (dx, dy)
+
+
+def steps(name: str, values: Array) -> tuple[Indices, float]:
+    """The index, from 0, of the grid line of each coordinate, and the distance of grid lines."""
+    levels = np.unique(values)
+    apart = np.diff(levels)
+    if not np.isfinite(levels).all() or len(levels) < 2:
+        found = "one value or none" if len(levels) < 2 else "values that are not finite"
+        raise InputError(name, found=found, expected="coordinates on a grid")
+    clear = apart[apart > 1e-3 * apart.max()]  # smaller differences are rounding errors
+    span = float(levels[-1] - levels[0])
+    # Lines of the grid can be missing. Rounded coordinates differ from the lines by less than one
+    # unit of the last digit: half a unit from their own rounding, and half from that of the ends.
+    digit = _last_digit(levels)
+    for count, rounded in ((np.rint(span / np.median(clear)), 0.0), (len(clear), digit)):
+        step = span / count
+        lines = (values - levels[0]) / step
+        number = np.rint(lines)
+        off = np.abs(lines - number)
+        if off.max() <= max(OFF_GRID, rounded / step if rounded < step / 4 else 0.0):
+            return number.astype(np.intp), step
+    worst = float(values[np.argmax(off)])
+    expected = f"coordinates {step:g} apart, on a regular grid, in columns x, y and height"
+    raise InputError(name, found=f"{worst:g}", expected=expected)
+
+
+def _last_digit(values: Array) -> float:
+    """The largest power of ten of which all values are multiples; 0 if they have many digits."""
+    first = int(np.floor(np.log10(np.abs(values).max())))
+    for power in range(first, first - 10, -1):
+        parts = values / 10.0**power
+        if np.abs(parts - np.rint(parts)).max() < 1e-5:
+            return 10.0**power
+    return 0.0

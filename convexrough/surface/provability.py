@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
-from convexrough.contact import Contact
+from convexrough.contact import Contact, discs_as_points
 from convexrough.errors import SolverError
+from convexrough.influence import couple
 from convexrough.plausibility import FEW
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
@@ -140,7 +141,7 @@ def crowded(contact: Contact, above: float = OVERLAP) -> tuple[Indices, Array]:
     checks.instance("contact", contact, Contact)
     touching = np.flatnonzero(contact.contact_radii)
     points, radii = contact.scene.contact_points[touching], contact.contact_radii[touching]
-    if len(touching) < 2:
+    if len(touching) == 0:
         return np.zeros((0, 2), dtype=np.intp), np.zeros(0)
     pairs = cKDTree(points).query_pairs(2 * radii.max() / above, output_type="ndarray")
     i, j = pairs.T
@@ -162,33 +163,23 @@ def model_errors(contact: Contact) -> Array:
     1
     """
     checks.instance("contact", contact, Contact)
-    scene, errors = contact.scene, np.zeros(len(contact.loads))
-    touching = np.flatnonzero(contact.loads)
-    points = scene.contact_points[touching]
-    strengths = (contact.loads * contact.contact_radii**2)[touching]
-    prescribed = (contact.approach + scene.offsets)[touching]
-    scale = 10 * np.pi * scene.material.contact_modulus
-    for some in np.array_split(np.arange(len(touching)), 1 + len(touching) // 1000):
-        apart = np.hypot(*(points[some, None] - points).transpose(2, 0, 1))
-        apart[np.arange(len(some)), some] = np.inf
-        errors[touching[some]] = (strengths / apart**3).sum(axis=1) / scale / prescribed[some]
+    scene, touching = contact.scene, np.flatnonzero(contact.loads)
+    errors = np.zeros(len(scene))
+    if len(touching) > 1:
+        scale = 1 / (np.pi * scene.material.contact_modulus)
+        A = couple(scene, touching, scale, contact.influence)
+        found = discs_as_points(A, contact.loads[touching], contact.contact_radii[touching])
+        errors[touching] = found / (contact.approach + scene.offsets[touching])
     return frozen(errors)
 
 
-def _pressed(summits: Summits, press: Press) -> tuple[int, int, str, float, float, float, float]:
+def _pressed(summits: Summits, press: Press) -> tuple[int, int, str, *tuple[float, ...]]:
     try:
         contact = press(summits)
     except SolverError:
-        unknown = float("nan")
-        return 0, len(summits), "failed", unknown, unknown, unknown, unknown
-    statuses, proof = contact.status, contact.certificate
-    touching = np.count_nonzero(contact.loads if proof.scope == "none" else statuses == "contact")
-    return (
-        int(touching),
-        int(np.count_nonzero(statuses == "undecided")),
-        proof.scope,
-        contact.crowding,
-        contact.model_error,
-        contact.approach,
-        contact.load,
-    )
+        return 0, len(summits), "failed", *[np.nan] * 4
+    statuses, scope = contact.status, contact.certificate.scope
+    touching = np.count_nonzero(contact.loads if scope == "none" else statuses == "contact")
+    undecided = np.count_nonzero(statuses == "undecided")
+    numbers = contact.crowding, contact.model_error, contact.approach, contact.load
+    return int(touching), int(undecided), scope, *numbers

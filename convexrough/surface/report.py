@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -36,11 +37,8 @@ LENGTHS = dict.fromkeys(("x", "y", "height", "tip_radius", "prominence"), "{}")
 LENGTHS |= dict.fromkeys(("largest_curvature", "smallest_curvature", "mean_curvature"), "1/{}")
 LENGTHS |= {"density": "1/{}²", "mean_height": "{}", "height_std": "{}"}
 
-#: At most this many crowded pairs of summits are printed.
-MOST_LISTED = 10
-
-#: At most this many unused comments are printed.
-MOST_COMMENTS = 5
+#: At most this many crowded pairs of summits, and unused comments, are printed.
+MOST_LISTED, MOST_COMMENTS = 10, 5
 
 #: A contact farther from the middle than this fraction of the half width causes a warning.
 NEAR_EDGE = 0.9
@@ -56,20 +54,14 @@ UNLIKE = 0.2
 
 @dataclass(frozen=True)
 class Scanned:
-    """A surface, its summits, and the results of pressing them.
-
-    maxima, summits : all summits, and those left by pruning
-    curve   : contacts at several prunings; None if nothing was pressed
-    contact : contact of `summits`; None if nothing was pressed or no solution was found
-    whole   : the contact of the whole map by boundary elements, or None
-    """
+    """A surface, its summits, and the results of pressing them."""
 
     surface: Surface
-    maxima: Summits
-    summits: Summits
-    curve: Provability | None = None
-    contact: Contact | None = None
-    whole: Whole | None = None
+    maxima: Summits  # all summits
+    summits: Summits  # those left by pruning
+    curve: Provability | None = None  # contacts at several prunings; None if nothing was pressed
+    contact: Contact | None = None  # of `summits`; None if no solution was found, either
+    whole: Whole | None = None  # contact of the whole map by boundary elements
 
     @classmethod
     def of(
@@ -80,20 +72,17 @@ class Scanned:
         maxima, summits = surface.summits(0.0, fit), surface.summits(prune, fit)
         if press is None:
             return cls(surface, maxima, summits)
-        curve = provability(maxima, press, levels=[*LEVELS, prune])
-        try:
+        curve, contact = provability(maxima, press, levels=[*LEVELS, prune]), None
+        with suppress(SolverError):
             contact = press(summits)
-        except SolverError:
-            return cls(surface, maxima, summits, curve)
-        pressed = press_whole(surface, contact) if whole else None
+        pressed = press_whole(surface, contact) if whole and contact is not None else None
         return cls(surface, maxima, summits, curve, contact, pressed)
 
     @property
     def certified(self) -> bool:
         """True if nothing was pressed, or if the contact is certified."""
-        return self.curve is None or (
-            self.contact is not None and self.contact.certificate.all_proved
-        )
+        found = self.contact
+        return self.curve is None or (found is not None and found.certificate.all_proved)
 
 
 def surface_summary(scanned: Scanned) -> dict[str, Any]:
@@ -187,14 +176,18 @@ def describe_surface(scanned: Scanned) -> list[str]:
         ("bandwidth", f"{surface.moments.bandwidth:.3g}  (m0 {surface.moments.m0:.4g}, "
                       f"m2 {surface.moments.m2:.4g}, m4 {surface.moments.m4:.4g})"),
     ]  # fmt: skip
-    described = labelled(lines)
-    described += ["", *_describe_statistics(scanned)]
+    found = scanned.maxima.statistics, summits.statistics, surface.moments
+    table: list[Any] = [["statistics", "all maxima", "after pruning", "from moments"]]
+    for name in found[0]._fields:
+        named = _in_unit(name, surface.unit).replace("_", " ")
+        table.append([named, *(getattr(each, name) for each in found)])
+    described = [*labelled(lines), "", *aligned(table, left=1, digits=4)]
     if scanned.curve is not None:
         described += ["", *_describe_curve(scanned.curve, surface.unit)]
     if scanned.contact is not None:
         described += [*_describe_crowded(scanned.contact)]
     if scanned.whole is not None:
-        table: list[Any] = [["at one approach", "asperities", "whole map", "difference"]]
+        table = [["at one approach", "asperities", "whole map", "difference"]]
         table += [[*each, f"{each[1] / each[2] - 1:+.1%}"] for each in scanned.whole.compared()]
         described += ["", *aligned(table, left=1)]
         change = f"{100 * scanned.whole.resolution:.2g} %"
@@ -211,11 +204,8 @@ def _not_used(comments: Sequence[str]) -> Iterator[tuple[str, str]]:
 
 
 def with_form(scanned: Scanned) -> tuple[tuple[float, float], float] | None:
-    """The radii of one body whose shape is that of the pressing body plus the removed forms.
-
-    The number is the angle [degrees] from x to the axis of the first radius. It is 0 if the radii
-    are those along x and y. None if nothing was pressed or no curved form was removed.
-    """
+    """The radii of a body with the shape of the pressing body plus the removed forms, and the angle
+    [degrees] from x to the axis of the first; None if nothing was pressed, or no form is curved."""
     forms = [each.tensor for each in scanned.surface.removed if any(each.curvatures)]
     if scanned.contact is None or not forms:
         return None
@@ -246,15 +236,6 @@ def _pressed_by(scanned: Scanned) -> Iterator[tuple[str, str]]:
 def _radii(radii: tuple[float, float]) -> str:
     first, second = (f"{each:.6g}" for each in radii)
     return first if first == second else f"[{first}, {second}]"
-
-
-def _describe_statistics(scanned: Scanned) -> list[str]:
-    found = scanned.maxima.statistics, scanned.summits.statistics, scanned.surface.moments
-    table: list[list[Any]] = [["statistics", "all maxima", "after pruning", "from moments"]]
-    for name in found[0]._fields:
-        named = _in_unit(name, scanned.surface.unit).replace("_", " ")
-        table.append([named, *(getattr(each, name) for each in found)])
-    return aligned(table, left=1, digits=4)
 
 
 def _describe_curve(curve: Provability, unit: str) -> list[str]:
@@ -304,13 +285,13 @@ def _near_holes(scanned: Scanned) -> Iterator[str]:
     from scipy.ndimage import maximum_filter  # slow to import
 
     near = maximum_filter(scanned.surface.filled_pixels, scanned.summits.origin.fit)
-    invented = near[tuple(scanned.summits.pixels.T)]
+    invented, contact = near[tuple(scanned.summits.pixels.T)], scanned.contact
     if not (count := np.count_nonzero(invented)):
         return
     said = f"summits fitted to filled pixels, whose heights are not measured: {count:,}"
-    if scanned.contact is not None and scanned.contact.loads.any():
-        loads = scanned.contact.loads[invented]
-        part = loads.sum() / scanned.contact.loads.sum()
+    if contact is not None and contact.loads.any():
+        loads = contact.loads[invented]
+        part = loads.sum() / contact.loads.sum()
         said += f"; touching: {np.count_nonzero(loads):,}, with {part:.1%} of the load"
     yield said
 

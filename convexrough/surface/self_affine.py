@@ -8,7 +8,7 @@ from convexrough import checks
 from convexrough.arrays import Array, Indices
 from convexrough.errors import InputError
 from convexrough.scene.asperities import checked_seed
-from convexrough.surface.moments import Moments
+from convexrough.surface.pixels import Moments
 from convexrough.surface.surface import Surface
 
 #: Default of the shortest wavelength, in pixels. Pixels of this size resolve tips.
@@ -77,17 +77,10 @@ def self_affine_moments(
 
 
 def _waves(
-    hurst: float,
-    rms_slope: float,
-    rolloff: float,
-    pixels: int,
-    pixel: float,
-    cutoff: float | None,
+    hurst: float, rms_slope: float, rolloff: float, pixels: int, pixel: float, cutoff: float | None
 ) -> tuple[Indices, Array]:
-    """The waves of a map, one for each pair of opposite wave vectors.
-
-    The result is (n, 2) the numbers of wavelengths in the map along x and y, and (n,) the variances
-    [length^2]. The order of the waves does not depend on the number of pixels.
+    """The waves of a map, one for each pair of opposite wave vectors, in an order independent of
+    `pixels`: (n, 2) numbers of wavelengths along x and y, and (n,) variances [length^2].
     """
     hurst = checks.between("hurst", hurst, 0.0, 1.0)
     rms_slope = checks.positive("rms_slope", rms_slope)

@@ -16,7 +16,7 @@ from convexrough.record import Along, Record, Table
 from convexrough.scene.asperities import Asperities
 from convexrough.sphere import ellipse
 from convexrough.surface.detrend import Removed
-from convexrough.surface.moments import Moments
+from convexrough.surface.pixels import Moments
 
 
 @dataclass(frozen=True, repr=False)
@@ -191,30 +191,20 @@ class Summits(Table, Asperities, Plottable):
 
 
 class Tips(NamedTuple):
-    """Paraboloids fitted around maxima.
+    """Paraboloids fitted around maxima: arrays have an entry for each of the n that are whole."""
 
-    `whole` has an entry for each maximum, other arrays for each of the n with `whole` True.
-
-    whole      : for each of the given maxima, True if its paraboloid curves downwards in every
-        direction and has its top within the fitted pixels
-    offsets    : (n, 2) [length] x and y of the top, relative to the pixel of the maximum
-    heights    : (n,) [length] heights of the tops
-    curvatures : (n, 2) [1/length] principal curvatures, the larger first
-    deviations : (n,) [length] root-mean-square distance of the pixels from the sphere of the tip
-    """
-
+    #: for each maximum, True if its paraboloid has a top, within the fitted pixels
     whole: NDArray[np.bool_]
-    offsets: Array
-    heights: Array
-    curvatures: Array
-    deviations: Array
+    offsets: Array  # (n, 2) [length] x and y of the top, from the pixel of the maximum
+    heights: Array  # (n,) [length] of the tops
+    curvatures: Array  # (n, 2) [1/length] principal curvatures, the larger first
+    deviations: Array  # (n,) [length] rms distance of the pixels from the sphere of the tip
 
 
 def fit_tips(heights: Array, pixels: Indices, pixel: tuple[float, float], across: int) -> Tips:
     """Least-squares paraboloids over `across` by `across` pixels about each maximum.
 
     pixels : (n, 2) row and column of the maxima, at least across // 2 from the edges of the map
-    pixel  : [length] sizes along x and y
     """
     reach = across // 2
     down, right = (each.ravel() for each in np.mgrid[-reach : reach + 1, -reach : reach + 1])

@@ -16,22 +16,18 @@ from convexrough.arrays import Array, frozen
 from convexrough.errors import InputError
 from convexrough.plottable import Plottable
 from convexrough.record import Record
-from convexrough.surface import holes
+from convexrough.surface import pixels
 from convexrough.surface.detrend import TRENDS, Removed, Trend, fitted
-from convexrough.surface.hills import Hills, hills
-from convexrough.surface.moments import Moments, moments_of
 from convexrough.surface.summits import Origin, Summits, fit_tips
 from convexrough.tabular.units import known_unit
 
 #: Largest ratio of the sides of a pixel; longer pixels do not resolve summits.
 MOST_ASPECT = 10.0
 
-#: A form that explains more than the fraction MOST of the variance of heights causes a warning. For
-#: this check it is fitted to at most FITTED pixels along a side.
-MOST, FITTED = 0.5, 256
-
-#: A paraboloid counts as round if its curvatures differ by less than this part of their mean.
-ROUND = 0.1
+#: A form, fitted to at most FITTED pixels along a side, causes a warning if it explains more than
+#: the fraction MOST of the variance of heights. A paraboloid whose curvatures differ by less than
+#: ROUND times their mean counts as a sphere.
+MOST, FITTED, ROUND = 0.5, 256, 0.1
 
 #: Smallest and largest rms slopes without a warning. Lapped steel has about 1e-2, polished wafers
 #: have 1e-3 to 1e-4.
@@ -116,9 +112,9 @@ class Surface(Record, Plottable):
             filled_pixels=filled_pixels,
             source=source,
             comments=comments,
-            clipped=holes.clipped(known) if clipped is None else clipped,
-            repeated=holes.repeated(known) if repeated is None else repeated,
-            copied=holes.copied(measured) if copied is None else copied,
+            clipped=pixels.clipped(known) if clipped is None else clipped,
+            repeated=pixels.repeated(known) if repeated is None else repeated,
+            copied=pixels.copied(measured) if copied is None else copied,
         )
 
     @property
@@ -155,14 +151,14 @@ class Surface(Record, Plottable):
         return float(np.sqrt(2 * self.moments.m2))
 
     @cached_property
-    def moments(self) -> Moments:
+    def moments(self) -> pixels.Moments:
         """Spectral moments, and statistics of summits that follow from them."""
-        return moments_of(self.heights, self.pixel)
+        return pixels.moments_of(self.heights, self.pixel)
 
     @cached_property
-    def hills(self) -> Hills:
+    def hills(self) -> pixels.Hills:
         """All maxima and their prominences."""
-        return hills(self.heights)
+        return pixels.hills(self.heights)
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
@@ -221,7 +217,7 @@ class Surface(Record, Plottable):
                 f"rms slope {self.rms_slope:.3g}: surfaces {rare} are rare; check the units of the "
                 "heights and of the pixel"
             )
-        if len(places := holes.spikes(self._measured)):
+        if len(places := pixels.spikes(self._measured)):
             row, column = places[0] + 1
             yield (
                 f"spikes or drop-outs: {len(places):,} pixels far from their neighbours, the first "
@@ -244,7 +240,7 @@ class Surface(Record, Plottable):
             expected = '"plane", "sphere" or "paraboloid"'
             raise InputError("detrend", found=repr(kind), expected=expected)
         trend, there = fitted(self._measured, self.pixel, kind)
-        left = holes.filled(self.heights - there)
+        left = pixels.filled(self.heights - there)
         if np.ptp(left) <= ROUNDING * float(np.abs(self.heights).max()):
             raise InputError("heights", found=f"nothing but a {kind}", expected="a rough surface")
         return replace(self, heights=left, removed=(*self.removed, trend))
@@ -265,8 +261,8 @@ class Surface(Record, Plottable):
         scale = own.into(into)
         removed = tuple(each.scaled(scale) for each in self.removed)
         dx, dy = self.pixel
-        return replace(self, heights=self.heights * scale, pixel=(dx * scale, dy * scale),
-                       unit=into.name, removed=removed)  # fmt: skip
+        heights, pixel = self.heights * scale, (dx * scale, dy * scale)
+        return replace(self, heights=heights, pixel=pixel, unit=into.name, removed=removed)
 
     @property
     def checksum(self) -> int:
@@ -296,14 +292,12 @@ class Surface(Record, Plottable):
         if fit % 2 == 0:
             raise InputError("fit", found=fit, expected="an odd number of pixels, at least 3")
         if min(shape) < fit:
-            found = f"{columns} by {rows} pixels"
-            raise InputError(
-                "map", found=found, expected=f"at least {fit} by {fit}, as fit is {fit}"
-            )
-        pixels, reach = self.hills.pixels, fit // 2
+            expected = f"at least {fit} by {fit}, as fit is {fit}"
+            raise InputError("map", found=f"{columns} by {rows} pixels", expected=expected)
+        maxima, reach = self.hills.pixels, fit // 2
         prominent = self.hills.prominences >= prune * self.max_height
-        inside = ((pixels >= reach) & (pixels < (rows - reach, columns - reach))).all(axis=1)
-        tried = pixels[prominent & inside]
+        inside = ((maxima >= reach) & (maxima < (rows - reach, columns - reach))).all(axis=1)
+        tried = maxima[prominent & inside]
         tips = fit_tips(self.heights, tried, self.pixel, fit)
         origin = Origin(
             source=self.source,
@@ -318,7 +312,7 @@ class Surface(Record, Plottable):
             moments=self.moments,
             prune=prune,
             fit=int(fit),
-            maxima=len(pixels),
+            maxima=len(maxima),
             pruned=int(np.count_nonzero(~prominent)),
             at_edge=int(np.count_nonzero(prominent & ~inside)),
             without_top=int(np.count_nonzero(~tips.whole)),

@@ -24,10 +24,6 @@ FACTORS = re.compile(r"(?<![a-z])(scales?|factors?|multipliers?|gain|offsets?)(?
 #: Extensions of files of arrays.
 ARRAYS = (".npy", ".npz", ".mat", ".parquet")
 
-#: Errors, besides OSError, raised for a file that is corrupted or not in the format of its
-#: extension. `foreign` converts errors of other packages to ValueError.
-SPOILED = (ValueError, csv.Error, EOFError, zlib.error)
-
 
 @contextmanager
 def reading(path: Path) -> Iterator[None]:
@@ -43,17 +39,14 @@ def reading(path: Path) -> Iterator[None]:
         raise FileError(f"{path}: not text: {error}") from error
     except OSError as error:
         raise FileError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except SPOILED as error:
+    except (ValueError, csv.Error, EOFError, zlib.error) as error:  # also those of `foreign`
         raise FileError(f"{path}: not an {path.suffix} file: {error}") from error
 
 
 @contextmanager
 def foreign() -> Iterator[None]:
-    """A context manager: turn errors of the body, except OSError, into ValueErrors.
-
-    For corrupted files numpy, scipy, pyarrow and openpyxl raise errors of many undocumented kinds.
-    The body should only call readers of these packages.
-    """
+    """A context manager: turn errors of the body, except OSError, into ValueErrors. For corrupted
+    files numpy, scipy, pyarrow and openpyxl raise errors of many undocumented kinds."""
     try:
         yield
     except OSError:
@@ -73,10 +66,8 @@ def needed(path: Path, package: str) -> Any:
 
 def named_arrays(path: Path) -> dict[str, Any]:
     """The arrays of a file by name; the name of an unnamed array is ""."""
-    if path.suffix.lower() == ".mat":
-        return _matlab(path)
-    if path.suffix.lower() == ".parquet":
-        return _parquet(path)
+    if own := {".mat": _matlab, ".parquet": _parquet}.get(path.suffix.lower()):
+        return own(path)
     with path.open("rb") as raw, foreign():
         loaded = np.load(raw, allow_pickle=False)
         if isinstance(loaded, np.ndarray):
@@ -91,16 +82,10 @@ def named_arrays(path: Path) -> dict[str, Any]:
 
 
 def read_arrays(path: Path, known: Sequence[str]) -> tuple[Columns, list[tuple[str, str]]]:
-    """Columns of a file by name; and for each array that may state units, its place and text.
-
-    Columns without names are numbered from "1".
+    """Columns of a file by name or number from 1; place and text of arrays that may state units.
 
     known : names to read, in lower case; other columns are kept only if they have the same length.
         If no column has one of these names, all columns are read
-
-    Raises FileError if the package for such files is missing, if no columns are found, or if the
-    file also has a factor other than 1 or an offset other than 0. Raises OSError; and ValueError,
-    EOFError or zlib.error if the file is corrupted or lengths differ.
     """
     named = named_arrays(path) or {"": np.zeros(0)}
     first, values = next(iter(named.items()))
@@ -178,9 +163,8 @@ def _matlab(path: Path) -> dict[str, Any]:
     with foreign():
         found = loadmat(str(path), appendmat=False, simplify_cells=True)
     named = {name: each for name, each in found.items() if not name.startswith("__")}
-    if len(named) == 1 and isinstance(only := next(iter(named.values())), dict):
-        named = only
-    return named
+    only = next(iter(named.values()), None)
+    return only if len(named) == 1 and isinstance(only, dict) else named
 
 
 def _parquet(path: Path) -> dict[str, Any]:

@@ -39,14 +39,11 @@ def bound(value: float, digits: int = 3) -> str:
 
 def _padded(table: PrintedTable, left: int, digits: int) -> list[list[str]]:
     cells = [[_cell(value, digits) for value in row] for row in table]
-    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
-    return [
-        [
-            f"{cell:{'<' if column < left else '>'}{width}}"
-            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ]
-        for row in cells
-    ]
+    columns = [*zip(*cells, strict=True)]
+    for i, column in enumerate(columns):
+        width = max(map(len, column))
+        columns[i] = tuple(it.ljust(width) if i < left else it.rjust(width) for it in column)
+    return [[*row] for row in zip(*columns, strict=True)]
 
 
 def _cell(value: Any, digits: int) -> str:

@@ -45,45 +45,30 @@ def is_index(header: str) -> bool:
     return bare(header).lower() in INDEX
 
 
-#: Largest number of characters of a line that are shown.
-MOST_SHOWN = 60
-
-#: Similarity above which the name of an unread column may be a misspelling of a missing one.
-LOOKS_LIKE = 0.75
-
-#: Largest relative difference of two factors that count as equal.
-SAME = 1e-9
+#: Largest number of characters of a line that are shown; similarity above which the name of an
+#: unread column may be a misspelling; and relative difference up to which factors are equal.
+MOST_SHOWN, LOOKS_LIKE, SAME = 60, 0.75, 1e-9
 
 
 @dataclass(frozen=True, kw_only=True)
 class Reading:
-    """How columns of a file are read.
+    """How columns of a file are read."""
 
-    columns : names in the file, by known name;  scales : factors of the numbers, by known name
-    units   : units of the scene;  convert : True to convert columns in other units, False to refuse
-    scalable : True if messages may propose the options --scale and --column
-    shared  : columns that are also read from another file; no message proposes --scale for them,
-        because the option would apply to both files
-    alike   : True if columns of one quantity must have one unit, even if the scene names none
-    """
-
+    #: names in the file, and factors of the numbers, by known name
     columns: Mapping[str, str] = field(default_factory=dict, hash=False)
     scales: Mapping[str, float] = field(default_factory=dict, hash=False)
-    units: UnitNames = NAMELESS
-    convert: bool = False
-    scalable: bool = False
-    shared: Sequence[str] = ()
-    alike: bool = True
+    units: UnitNames = NAMELESS  # of the scene
+    convert: bool = False  # True to convert columns in other units, False to refuse them
+    scalable: bool = False  # True if messages may propose the options --scale and --column
+    shared: Sequence[str] = ()  # columns also in another file, to which --scale would apply, too
+    alike: bool = True  # True to demand one unit of a quantity, even if the scene names none
 
 
 AS_IT_IS = Reading()
 
 
 def named_columns(what: str, given: Mapping[str, str], known: Sequence[str]) -> dict[str, str]:
-    """The header of each known column in `given`, by known name.
-
-    An entry of `given` is a known name and a header, in either order.
-    """
+    """The headers in `given`, by known name; an entry has name and header in either order."""
     named = {}
     for one, other in given.items():
         name, column = (one, other) if one in known or other not in known else (other, one)
@@ -97,10 +82,7 @@ def named_columns(what: str, given: Mapping[str, str], known: Sequence[str]) -> 
 def places_of(
     wanted: Sequence[str], names: Sequence[str], how: Reading, found: str
 ) -> tuple[dict[str, int], list[str]]:
-    """The place of each wanted column that the file has, from 0, by its name; and mistakes.
-
-    names : the headers of the file;  found : these headers as text for messages
-    """
+    """Places, from 0, of wanted columns by name; and mistakes, in which `found` shows `names`."""
     bared = [bare(name) for name in names]
     lowered = [each.lower() for each in bared]
     places: dict[str, int] = {}
@@ -184,11 +166,8 @@ def factors_of(
 
 
 def units_in(said: Iterable[tuple[str, str]], names: Sequence[str], how: Reading) -> Iterator[str]:
-    """A mistake for each text that names another unit than the scene's.
-
-    said  : for each text its place in the file, and the text
-    names : columns without a unit in the header, whose unit the text may state
-    """
+    """A mistake for each text, said at a place in the file, that names another unit than the
+    scene's for one of the columns `names`, whose headers state none."""
     kinds = {COLUMNS[name].kind for name in names}
     for place, text in said:
         for name in in_text(text):

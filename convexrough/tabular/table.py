@@ -15,20 +15,9 @@ from numpy.typing import NDArray
 from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.errors import InputError, TableError
+from convexrough.tabular import roles
 from convexrough.tabular.arrays import ARRAYS, read_arrays, reading
-from convexrough.tabular.roles import (
-    AS_IT_IS,
-    COLUMNS,
-    INDEX,
-    Column,
-    Reading,
-    factors_of,
-    is_index,
-    lookalikes,
-    places_of,
-    shortened,
-    units_in,
-)
+from convexrough.tabular.roles import AS_IT_IS, COLUMNS, Reading, is_index, shortened
 from convexrough.tabular.text import HOLES, PERHAPS_GROUPED, Style, TextTable, read_text_table
 from convexrough.tabular.units import bare, unit
 
@@ -36,38 +25,26 @@ from convexrough.tabular.units import bare, unit
 TOTALS = ("sum", "total", "totals", "grand total", "summe", "gesamt", "somme", "suma",
           "mean", "average", "max", "min", "maximum", "minimum")  # fmt: skip
 
-#: Largest number of mistakes of one file that are shown; the rest are counted.
-MOST_MISTAKES = 10
-
-#: If at least this many cells have exactly three digits after the point or comma (1.013), one whole
-#: number below 100 in the same column is enough to show that this mark separates thousands.
-SURELY_GROUPED = 10
+#: Number of mistakes of one file that are shown; and number of cells such as 1.013 with which one
+#: whole number below 100 in their column is enough to show that the mark separates thousands.
+MOST_MISTAKES, SURELY_GROUPED = 10, 10
 
 _WHOLE, _HUNDREDS = re.compile(r"[+-]?\d{1,3}"), re.compile(r"[+-]?(?!999)[1-9]\d\d")
 
 
 class ReadTable(NamedTuple):
-    """Columns of a file by known names, and how the file was read.
+    """Columns of a file by known names, and how the file was read."""
 
-    columns : numbers, or text for the columns read as text
-    rows    : name of each row in messages;  lines : text of each row, "" in files of arrays (.npy,
-        .npz, .mat, .parquet)
-    units   : units that headers name;  style : how text was split, "" for files of arrays
-    called  : headers of the columns that were read
-    others : contents of the columns that were not asked for. Keys are headers ("" if a header is
-        empty), or numbers from 1 if there is no header. The column that `Reading.columns` names as
-        index has the key "index". A column is text if one of its cells is not a number
-    factors : factors other than 1 by which columns were multiplied
-    """
-
-    columns: dict[str, NDArray[Any]]
-    rows: list[str]
-    lines: list[str]
-    units: dict[str, str]
-    style: str
-    called: dict[str, str]
+    columns: dict[str, NDArray[Any]]  # numbers, or text for the columns read as text
+    rows: list[str]  # the name of each row in messages
+    lines: list[str]  # the text of each row, "" in files of arrays
+    units: dict[str, str]  # those that headers name
+    style: str  # how text was split, "" for files of arrays
+    called: dict[str, str]  # the headers
+    #: Columns that were not asked for, by header or number from 1, as numbers if all cells are. The
+    #: one that `Reading.columns` names as index has the key "index".
     others: dict[str, NDArray[Any]]
-    factors: dict[str, float]
+    factors: dict[str, float]  # factors other than 1 by which columns were multiplied
 
     def mistake(self, row: int, what: str) -> str:
         """The message of a mistake in a row: name of the row, `what`, text of the line."""
@@ -75,19 +52,28 @@ class ReadTable(NamedTuple):
 
 
 class _Source(NamedTuple):
-    """Cells of a file by column. Without a header, columns are named by numbers from 1.
-
-    rows, lines : as in `ReadTable`;  mistakes : messages on rows that are left out
-    said : place and text of all that may name units outside the header, such as comments
-    """
+    """Cells of a file by column, with `rows` and `lines` as in `ReadTable`."""
 
     header: list[str] | None
     columns: list[Sequence[Any]]
     rows: list[str]
     lines: list[str]
     style: Style
-    mistakes: Sequence[str] = ()
-    said: Sequence[tuple[str, str]] = ()
+    mistakes: Sequence[str] = ()  # messages on rows that are left out
+    said: Sequence[tuple[str, str]] = ()  # place and text of all that may name units, as comments
+
+    def named(self) -> str:
+        """The headers, or the numbers of columns and rows, for a message."""
+        if self.header is not None:
+            return shortened(", ".join(self.header)) + in_sheet(str(self.style))
+        columns, rows = len(self.columns), len(self.rows)
+        turned = f" of {rows}: transposed?" if columns > rows > 1 else ""
+        return f"no header and {columns} columns{turned}"
+
+    def numbers_or_text(self, place: int) -> NDArray[Any]:
+        """A column as numbers if all of its cells are, else as text."""
+        numbers = self.style.numbers(self.columns[place])
+        return np.array([str(cell) for cell in self.columns[place]]) if numbers is None else numbers
 
 
 def read_table(
@@ -102,31 +88,29 @@ def read_table(
     how: Reading = AS_IT_IS,
     table: TextTable | None = None,
 ) -> ReadTable:
-    """Columns of a file by known names. The numbers of other columns are not checked.
+    """Columns of a file by known names; TableError has every mistake of the file.
 
     required, optional : names of columns in `COLUMNS`
-    instead : columns that replace the only required one, if the file lacks the required one but has
-        the first of these
+    instead : columns that replace the only required one if the file has the first of these, only
     holes : columns in which `HOLES` are read as nan
     unnamed : lists of names for files without a header; the one of matching length is used
-    line : number of cells of one line without a header that is read as one column; a line of more
-        than 3 cells always is (only with `unnamed`, and if `how` names no columns)
+    line : a single line without a header and with this many cells, or more than 3, is one column
     table : the cells of the file, if they are already read
-
-    Raises FileError for unreadable files, and TableError with every mistake in the file.
     """
     wanted = [*required, *optional, *instead, *(["index"] if "index" in how.columns else [])]
     called = [each.lower() for each in how.columns.values()]
     with reading(path):
-        sheet, known = [*required, *instead[:1], *called], [*wanted, *INDEX[:-1], *called]
+        sheet, known = [*required, *instead[:1], *called], [*wanted, *roles.INDEX[:-1], *called]
         source = _source(path, known, sheet) if table is None else _text_source(table)
     alone = source.header is None and len(source.rows) == 1 and not how.columns
     if unnamed and alone and (len(source.columns) > 3 or len(source.columns) == line):
-        source = _upright(source)
+        line_cells = [column[0] for column in source.columns]
+        rows = [f"{source.rows[0]}, cell {i}" for i in range(1, len(line_cells) + 1)]
+        source = source._replace(columns=[line_cells], rows=rows, lines=[*map(str, line_cells)])
     headers = source.header or [""] * len(source.columns)
     if source.header is None and not how.columns:
         headers = next((each for each in unnamed if len(each) == len(headers)), headers)
-    places, mistakes = places_of(wanted, headers, how, _named(source))
+    places, mistakes = roles.places_of(wanted, headers, how, source.named())
     index = places.pop("index", None)
     if instead and instead[0] in places and required[0] not in places:
         required = ()
@@ -141,7 +125,7 @@ def read_table(
     advice = ": rename one" if source.header else ": add a first row with names"
     advice = "" if how.scalable else advice
     mistakes += [
-        f"columns: found {_named(source)}, expected a column {each!r}"
+        f"columns: found {source.named()}, expected a column {each!r}"
         + advice
         + (f"; --column {each}={other} names another" if how.scalable else "")
         + (f", --column {instead[0]}={other} that of pixels" if how.scalable and pixels else "")
@@ -149,21 +133,21 @@ def read_table(
         if each not in how.columns
     ]
     measured = (name for name in optional if COLUMNS[name].kind and name not in places)
-    mistakes += lookalikes(left, [*missing, *measured])
+    mistakes += roles.lookalikes(left, [*missing, *measured])
     if not source.rows and not mistakes and not source.mistakes:
         mistakes = ["rows: found none below the header, expected at least one"]
     if missing or not source.rows:
-        raise TableError(str(path), few([*mistakes, *source.mistakes]))
+        refuse(path, [*mistakes, *source.mistakes])
     names = source.header or [str(i + 1) for i in range(len(source.columns))]
     units = {name: found for name, place in places.items() if (found := unit(names[place]))}
-    factors, wrong = factors_of([name for name in places if COLUMNS[name].kind], units, how)
+    factors, wrong = roles.factors_of([name for name in places if COLUMNS[name].kind], units, how)
     rest = [i for i in range(len(names)) if i not in (index, *places.values())]
     texts = [*(source.said if table is None else ())]
     for i in (i for i in rest if "unit" in names[i].lower()):
         said = dict.fromkeys(map(str, source.columns[i]))
         texts += [(f"column {names[i]}", each) for each in said]
     without = [name for name in places if name not in (*units, *how.scales)]
-    mistakes += [*wrong, *units_in(texts, without, how)]
+    mistakes += [*wrong, *roles.units_in(texts, without, how)]
     read: dict[str, NDArray[Any]] = {}
     for name, place in places.items():
         cells = source.columns[place]
@@ -173,21 +157,13 @@ def read_table(
             numbers = _numbers(name, cells, source, mistakes, name in holes)
             mistakes += _thousands([cells], source)
             read[name] = numbers * factors.get(name, 1.0)
-    if mistakes := [*mistakes, *source.mistakes]:
-        raise TableError(str(path), few(mistakes))
-    unread = {names[i]: _numbers_or_text(source, i) for i in rest}
+    refuse(path, [*mistakes, *source.mistakes])
+    unread = {names[i]: source.numbers_or_text(i) for i in rest}
     if index is not None:
-        unread["index"] = _numbers_or_text(source, index)
-    return ReadTable(
-        read,
-        source.rows,
-        source.lines,
-        units,
-        str(source.style),
-        {name: names[place] or str(place + 1) for name, place in places.items()},
-        unread,
-        factors,
-    )
+        unread["index"] = source.numbers_or_text(index)
+    titles = {name: names[place] or str(place + 1) for name, place in places.items()}
+    style = str(source.style)
+    return ReadTable(read, source.rows, source.lines, units, style, titles, unread, factors)
 
 
 def matrix(path: Path, table: TextTable) -> Array:
@@ -197,19 +173,13 @@ def matrix(path: Path, table: TextTable) -> Array:
         _numbers(str(i), cells, source, mistakes, True) for i, cells in enumerate(source.columns, 1)
     ]
     mistakes += _thousands(source.columns, source)
-    if mistakes := [*mistakes, *source.mistakes]:
-        raise TableError(str(path), few(mistakes))
+    refuse(path, [*mistakes, *source.mistakes])
     return np.column_stack(columns)
 
 
 def _thousands(columns: Sequence[Sequence[Any]], source: _Source) -> Iterator[str]:
-    """A mistake if cells such as 1.013 seem to have thousands separators, because the same columns
-    also contain whole numbers such as 827.
-
-    This is so if all other cells, except holes, are whole numbers of at most three digits, and one
-    of them has three digits (not 999, which often marks a hole). If at least `SURELY_GROUPED` cells
-    have the form of 1.013, one whole number with fewer digits is enough.
-    """
+    """A mistake if cells such as 1.013 seem to have thousands separators: if all others, except
+    holes, are whole numbers up to 998, and one is above 99 (or `SURELY_GROUPED` cells are such)."""
     mark = source.style.decimal
     if not mark or not any(mark in "\n".join(cells) for cells in columns):
         return
@@ -227,12 +197,6 @@ def _thousands(columns: Sequence[Sequence[Any]], source: _Source) -> Iterator[st
         found = f"found {grouped[0][0]}, and {shown[0]} in {shown[1]}"
         expected = "numbers without thousands separators, or with the same number of decimals"
         yield f"{grouped[0][1]}: {found}, expected {expected}"
-
-
-def _numbers_or_text(source: _Source, place: int) -> NDArray[Any]:
-    cells = source.columns[place]
-    numbers = source.style.numbers(cells)
-    return np.array([str(cell) for cell in cells]) if numbers is None else numbers
 
 
 def _source(path: Path, known: Sequence[str], sheet: Sequence[str]) -> _Source:
@@ -254,15 +218,9 @@ def _text_source(table: TextTable) -> _Source:
             mistakes.append(_shown(f"row {row.number}: {what}", row.text))
         else:
             whole.append(row)
-    pointless = not any("." in row.text for row in table.rows)
+    text = "\n".join(row.text for row in table.rows) if style.separator == "," else "."
     doubled = counts and width <= min(counts) and max(counts) == 2 * width
-    if (
-        style.separator == ","
-        and pointless
-        and (
-            doubled or (header is None and any(re.search(r",0\d", row.text) for row in table.rows))
-        )
-    ):
+    if "." not in text and (doubled or (header is None and re.search(r",0\d", text))):
         found = f"rows: found up to {max(counts)} parts between commas, expected numbers"
         mistakes = [f"{found}: write decimal points, or semicolons between columns"]
     return _Source(
@@ -286,26 +244,8 @@ def _misfit(cells: Sequence[str], width: int, header: list[str] | None) -> str:
     return ""
 
 
-def _upright(source: _Source) -> _Source:
-    """A single line of numbers as a single column."""
-    cells = [column[0] for column in source.columns]
-    rows = [f"{source.rows[0]}, cell {i + 1}" for i in range(len(cells))]
-    return source._replace(columns=[cells], rows=rows, lines=[str(cell) for cell in cells])
-
-
-def _named(source: _Source) -> str:
-    if source.header is None:
-        columns, rows = len(source.columns), len(source.rows)
-        turned = f" of {rows}: transposed?" if columns > rows > 1 else ""
-        return f"no header and {columns} columns{turned}"
-    return shortened(", ".join(source.header)) + in_sheet(str(source.style))
-
-
 def in_sheet(style: str) -> str:
-    """The end of a message: the sheet that was read, and sheets with as many wanted columns.
-
-    "" if the file is no workbook.
-    """
+    """The end of a message: the sheet of a workbook, and others with as many wanted columns."""
     return f" in {style}" if style.startswith("sheet ") else ""
 
 
@@ -315,7 +255,7 @@ def _numbers(
     """The numbers of a column; wrong cells are added to `mistakes`."""
     if holes:
         cells = ["nan" if str(cell).lower() in HOLES else cell for cell in cells]
-    check = checks.positive if COLUMNS.get(name, Column()).positive else checks.finite
+    check = checks.positive if COLUMNS.get(name, roles.Column()).positive else checks.finite
     style = source.style
     numbers = style.numbers(cells)
     if numbers is None and not any(map(str, cells)):
@@ -347,6 +287,12 @@ def _numbers(
 
 def _shown(mistake: str, line: str) -> str:
     return f"{mistake}: {shortened(line)}" if line else mistake
+
+
+def refuse(path: Path, mistakes: list[str]) -> None:
+    """Raise TableError with the first mistakes of a file, if there are any."""
+    if mistakes:
+        raise TableError(str(path), few(mistakes))
 
 
 def few(mistakes: list[str], most: int = MOST_MISTAKES) -> list[str]:

@@ -25,11 +25,8 @@ from convexrough.errors import FileError
 from convexrough.tabular.arrays import foreign, needed
 from convexrough.tabular.units import bare, parsed, unit
 
-#: Largest number of characters of a line.
-LONGEST = 2**24
-
-#: Largest number of characters of a number.
-LONGEST_NUMBER = 400
+#: Largest number of characters of a line, and of a number.
+LONGEST, LONGEST_NUMBER = 2**24, 400
 
 #: Extensions of Excel workbooks.
 WORKBOOKS = (".xlsx", ".xlsm")
@@ -77,15 +74,11 @@ _BINARY = {
 
 
 class Style(NamedTuple):
-    """The separator of cells, the decimal mark and, for a workbook, the name of the sheet.
+    """How the cells of a file are separated and written."""
 
-    The separator of a single column is "". For a file of arrays, whose cells are numbers, the
-    decimal mark is "" too.
-    """
-
-    separator: str
-    decimal: str
-    sheet: str = ""
+    separator: str  # "" for a single column
+    decimal: str  # "" for a file of arrays, whose cells are numbers
+    sheet: str = ""  # of a workbook
 
     def __str__(self) -> str:
         if self.sheet:
@@ -125,9 +118,8 @@ class Style(NamedTuple):
     def numbers(self, cells: Sequence[Any]) -> Array | None:
         """The numbers in cells; None if any cell is not a number."""
         if not self.decimal:
-            return (
-                np.array(cells, dtype=np.float64) if {*map(type, cells)} <= {int, float} else None
-            )
+            are_numbers = {*map(type, cells)} <= {int, float}
+            return np.array(cells, dtype=np.float64) if are_numbers else None
         joined = "\n".join(cells)
         if "_" not in joined and (self.decimal == "." or "." not in joined):
             with suppress(ValueError):
@@ -173,9 +165,7 @@ def read_text_table(
     """The cells of a text file or workbook. Raises FileError if the file is empty or not text.
 
     known : names of columns, in lower case; the line with most of them is the header
-    required : names of columns; the sheet of a workbook that has most of them is read. Among sheets
-        with equally many, it is the first that has a column of `known`, or else the first; if no
-        sheet has any, it is the first with most columns of `known`
+    required : names of columns; the sheet of a workbook with most of them, then of `known`, is read
     is_map : True for a map of heights; exactly one sheet of a workbook must hold a map. Lines
         of text above the numbers that are not a header are comments
     """
@@ -200,7 +190,7 @@ def read_text_table(
                 units = cells
             else:
                 titles.append((number, said))
-        elif ("\t" in text or inner) and (not _RULE.fullmatch(inner) or _are_holes(inner.split())):
+        elif ("\t" in text or inner) and not _is_rule(inner):
             text, *behind = [text] if '"' in text else _BEHIND.split(text, maxsplit=1)
             comments += behind if not lines else ()
             lines.append((number, text if separator or "\t" in text else text.strip()))
@@ -223,7 +213,9 @@ def read_text_table(
             units, rows = below, rows[1:]
         elif len(units) != len(header.cells) or any(map(unit, header.cells)):
             units = []
-        header = header._replace(cells=_with_units(header.cells, units))
+        named = zip_longest(header.cells, (each.strip("[]() -") for each in units), fillvalue="")
+        names = [f"{name} [{each}]" if each else name for name, each in named]
+        header = header._replace(cells=names)
     elif len(rows[0].cells) > 3:  # a matrix, whose rows can be without numbers
         top = top if above[0].number < top else filled[0].number
         rows = [row for row in every if top <= row.number <= filled[-1].number]
@@ -276,20 +268,9 @@ def _are_units(cells: Sequence[str]) -> bool:
     return any(bared) and all(cell in ("", "-") or parsed(cell) is not None for cell in bared)
 
 
-def _with_units(names: list[str], units: Sequence[str]) -> list[str]:
-    """The names of columns, each followed by its unit in brackets."""
-    bared = [cell.strip("[]() -") for cell in units]
-    return [
-        f"{name} [{each}]" if each else name
-        for name, each in zip_longest(names, bared, fillvalue="")
-    ]
-
-
 def _unlisted(header: TextRow, rows: list[TextRow], first: int, style: Style) -> list[TextRow]:
-    """The rows of a finite-element listing, without titles, repeated headers and closing lines.
-
-    first : place in `rows` of the first row of numbers
-    """
+    """The rows of a finite-element listing, of which `rows[first]` is the first with numbers,
+    without titles, repeated headers and closing lines."""
     width = len(rows[first].cells)
 
     def title(row: TextRow) -> bool:
@@ -329,11 +310,8 @@ def _lines(path: Path) -> Iterator[tuple[int, str]]:
 def _sheet_lines(
     path: Path, known: Sequence[str], required: Sequence[str], is_map: bool
 ) -> tuple[str, Iterator[tuple[int, str]], list[str]]:
-    """The name, the numbered rows and the comments of the sheet that `read_text_table` reads.
-
-    Tabs separate cells. The name is in quotes, and followed by the names of other sheets that fit
-    equally well. For a map, the comments are the rows of the other sheets.
-    """
+    """The sheet that `read_text_table` reads: its name and those of others that fit equally well,
+    in quotes; its numbered rows, separated by tabs; and, for a map, the rows of other sheets."""
     openpyxl = needed(path, "openpyxl")
     with path.open("rb") as raw, foreign():
         book = openpyxl.load_workbook(raw, read_only=True, data_only=True)
@@ -389,10 +367,9 @@ def _encoding(path: Path, raw: BufferedReader[Any]) -> str:
             raise FileError(f"{path}: not text: {what}")
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16"
-    if len(head) > 3 and not any(head[1::2]) and all(head[0::2]):
-        return "utf-16-le"
-    if len(head) > 3 and not any(head[0::2]) and all(head[1::2]):
-        return "utf-16-be"
+    for encoding, low in (("utf-16-le", 0), ("utf-16-be", 1)):
+        if len(head) > 3 and all(head[low::2]) and not any(head[1 - low :: 2]):
+            return encoding
     return "utf-8-sig"
 
 
@@ -415,8 +392,11 @@ def _sniffed(lines: Sequence[str], styles: Sequence[Style]) -> Style:
     return max(styles, key=score)
 
 
-def _are_holes(cells: Sequence[str]) -> bool:
-    return len(cells) > 1 and all(cell.lower() in HOLES for cell in cells)
+def _is_rule(line: str) -> bool:
+    """True for a rule between parts of a file, but not for several marks of holes such as ---."""
+    cells = line.split()
+    holes = len(cells) > 1 and all(cell.lower() in HOLES for cell in cells)
+    return not holes and _RULE.fullmatch(line) is not None
 
 
 def _check_ungrouped(path: Path, lines: Sequence[tuple[int, str]], style: Style) -> None:

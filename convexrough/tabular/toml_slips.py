@@ -5,52 +5,32 @@ from __future__ import annotations
 import re
 import tomllib
 
-#: Largest number of mistakes of one file that are explained.
-MOST_SLIPS = 10
-
-#: Largest number of characters of a line that are shown.
-MOST_SHOWN = 60
+#: Largest number of mistakes of one file, and of characters of a line, that are shown.
+MOST_SLIPS, MOST_SHOWN = 10, 60
 
 _KEY = "[A-Za-z0-9_.-]+"
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 
-#: For each mistake: the pattern of what follows the key, its correction, and what was expected.
-_SLIPS = [
-    (
-        r"=\s*(?P<whole>[+-]?\d+),(?P<part>\d+(?:[eE][+-]?\d+)?)",
-        "{whole}.{part}",
-        "a decimal point instead of a comma",
-    ),
-    (
-        rf"=\s*(?P<number>{_NUMBER})[dD](?P<power>[+-]?\d+)",
-        "{number}e{power}",
-        "an exponent with e",
-    ),
-    (
-        rf"=\s*(?P<number>{_NUMBER})\s*(?![exEX]\W*\d)[^\W\d_][^\s#=]*",  # 5e+-5 has no unit
-        "{number}",
-        "a number without unit; units are only named, in [units]",
-    ),
-    (
-        r"=\s*(?P<number>[+-]?(?:\d+\.|\.\d+)(?:[eE][+-]?\d+)?)",
-        "{number}",
-        "digits on both sides of the point",
-    ),
-    (r"=\s*(?P<word>(?i:[+-]?inf|true|false))", "{word}", "lower case"),
-    (
-        r"=\s*[\u201c\u201d\u201e\u2018\u2019\u00ab]?"
-        r"(?P<text>[^\W\d][^\"'=#\[\]{}\u201c\u201d\u2018\u2019\u00bb]*?)"
-        r"[\u201c\u201d\u2018\u2019\u00bb]?",
+_OPENING, _CLOSING = "[\u201c\u201d\u201e\u2018\u2019\u00ab]", "\u201c\u201d\u2018\u2019\u00bb"
+
+#: By what is expected instead of a mistake: its correction, and the pattern of what follows the key
+_SLIPS = {
+    "a decimal point instead of a comma": (
+        "{whole}.{part}", r"=\s*(?P<whole>[+-]?\d+),(?P<part>\d+(?:[eE][+-]?\d+)?)"),
+    "an exponent with e": (
+        "{number}e{power}", rf"=\s*(?P<number>{_NUMBER})[dD](?P<power>[+-]?\d+)"),
+    "a number without unit; units are only named, in [units]": (  # 5e+-5 has no unit
+        "{number}", rf"=\s*(?P<number>{_NUMBER})\s*(?![exEX]\W*\d)[^\W\d_][^\s#=]*"),
+    "digits on both sides of the point": (
+        "{number}", r"=\s*(?P<number>[+-]?(?:\d+\.|\.\d+)(?:[eE][+-]?\d+)?)"),
+    "lower case": ("{word}", r"=\s*(?P<word>(?i:[+-]?inf|true|false))"),
+    "text in straight quotes, or a number": (
         '"{text}"',
-        "text in straight quotes, or a number",
-    ),
-    (r":\s*(?P<value>[^\s#].*?)", "{value}", "an equals sign instead of a colon"),
-    (
-        rf"=\s*(?P<value>{_NUMBER}|\"[^\"]*\"|\[[^\]]*\])\s*[;,]",
-        "{value}",
-        "nothing at the end of the line",
-    ),
-]
+        rf"=\s*{_OPENING}?(?P<text>[^\W\d][^\"'=#\[\]{{}}{_CLOSING}]*?)[{_CLOSING}]?"),
+    "an equals sign instead of a colon": ("{value}", r":\s*(?P<value>[^\s#].*?)"),
+    "nothing at the end of the line": (
+        "{value}", rf"=\s*(?P<value>{_NUMBER}|\"[^\"]*\"|\[[^\]]*\])\s*[;,]"),
+}  # fmt: skip
 
 
 def explained(path: object, text: str, error: Exception) -> str:
@@ -82,7 +62,7 @@ def explained(path: object, text: str, error: Exception) -> str:
 
 def _corrected(line: str) -> tuple[str, str] | None:
     """The corrected line and the reason; None if no correction is known."""
-    for pattern, meant, why in _SLIPS:
+    for why, (meant, pattern) in _SLIPS.items():
         if found := re.fullmatch(rf"\s*(?P<key>{_KEY})\s*{pattern}\s*(?:#.*)?", line):
             parts = {name: part.strip() for name, part in found.groupdict().items()}
             if "number" in parts:

@@ -69,10 +69,8 @@ _IN_TEXT = re.compile(
     r"|(纳米|微米|毫米)"
 )
 
-
-#: Largest number of characters of a column's name with its unit.
+#: The name of a column with its unit, which has at most LONGEST_NAME characters.
 LONGEST_NAME = 400
-
 _WITH_UNIT = re.compile(
     r"(?P<name>.*?)(?:\s*[\[(](?P<unit>[^\])]*)[\])]|\s+/\s*(?P<per>\S+)|/(?P<tight>\S+))"
 )
@@ -107,19 +105,19 @@ def parsed(name: str) -> Unit | None:
 
 def bare(name: str) -> str:
     """The name of a column without its unit."""
-    found = _with_unit(name)
-    return found["name"] if found else name
+    return _apart(name)[0]
 
 
 def unit(name: str) -> str:
     """The unit in the name of a column, in brackets or after a slash; "" if there is none."""
-    found = _with_unit(name)
-    return (found["unit"] or found["per"] or found["tight"] or "").strip() if found else ""
+    return _apart(name)[1]
 
 
-def _with_unit(name: str) -> re.Match[str] | None:
+def _apart(name: str) -> tuple[str, str]:
     found = _WITH_UNIT.fullmatch(name) if len(name) <= LONGEST_NAME else None
-    return None if found and found["tight"] and not parsed(found["tight"]) else found  # as for p/p0
+    if not found or (found["tight"] and not parsed(found["tight"])):  # as for p/p0
+        return name, ""
+    return found["name"], (found["unit"] or found["per"] or found["tight"] or "").strip()
 
 
 def known_unit(what: str, name: str, kind: str = "length", where: str = "") -> Unit | None:

@@ -21,16 +21,17 @@ from convexrough.normal.claims import Claim, tolerance
 from convexrough.normal.problem import NormalProblem
 from convexrough.scene.neighbours import nearest_distances
 from convexrough.scene.scene import Scene
-from convexrough.surface.height_grid import steps
+from convexrough.surface.map_arrays import steps
 from convexrough.tabular.columns import bound
 from convexrough.tabular.roles import Reading
-from convexrough.tabular.table import ReadTable, few, read_table
+from convexrough.tabular.table import ReadTable, read_table, refuse
 from convexrough.tabular.units import bare, unit
 from convexrough.verdict.placing import Placing, unused
 from convexrough.verdict.verdict import verify_on
 
-#: Negative loads up to this fraction of the largest load, in absolute value, may be noise.
-SMALL = 1e-3
+#: Negative loads up to SMALL times the largest load may be noise. Heights or tip radii may be
+#: rounded if they differ by up to ROUNDED times the largest.
+SMALL, ROUNDED = 1e-3, 1e-2
 
 #: The status that a word in a column "status" or "contact", or a flag in "contact", claims.
 WORDS = {"contact": "contact", "closed": "contact", "open": "open"}
@@ -44,15 +45,9 @@ CLAIMS = {
     "no_contact": {flag: "open" if it == "contact" else "contact" for flag, it in FLAGS.items()},
 }
 
-#: Largest difference of heights or tip radii due to rounding, as a fraction of the largest.
-ROUNDED = 1e-2
-
 #: A grid line is incomplete if it lacks more than GAPS times as many points as it has under
 #: pressure. A grid is refused if such lines together lack more than FEW_GAPS times as many.
 GAPS, FEW_GAPS = 0.5, 0.05
-
-#: Largest number of unknown words of a column in a note.
-MOST = 3
 
 #: Words that mark a column as one of shear statuses, whatever its header.
 OF_SHEAR = {"sliding", "partial", "sticking", "slip", "slipping", "stick", "stuck", "undecided"}
@@ -64,20 +59,13 @@ STATUSES = ("sliding", "partial", "sticking", "open", "undecided")
 
 @dataclass(frozen=True, kw_only=True)
 class Manner(Reading):
-    """How a file of forces is read.
+    """How a file of forces is read."""
 
-    sign      : -1 if compression is negative;  floor : [force] loads up to this size count as 0
-    tolerance : [length] largest error of a position; default: 1 % of the smallest distance of two
-        asperities
-    missing_open : True if asperities without a row are open
-    nodes     : True if rows are nodes or pixels, summed by asperity
-    """
-
-    sign: int = 1
-    tolerance: float | None = None
-    missing_open: bool = False
-    nodes: bool = False
-    floor: float = 0.0
+    sign: int = 1  # -1 if compression is negative
+    tolerance: float | None = None  # [length] largest error of a position; default: 1 % of spacing
+    missing_open: bool = False  # True if asperities without a row are open
+    nodes: bool = False  # True if rows are nodes or pixels, summed by asperity
+    floor: float = 0.0  # [force] loads up to this size count as 0
     scalable: bool = True
 
     def __post_init__(self) -> None:
@@ -87,28 +75,18 @@ class Manner(Reading):
 
 
 class Claimed(NamedTuple):
-    """Forces of a file, in the order of the scene's asperities.
-
-    status : (n,) the statuses in the file; None if it has no such column
-    note   : how the file was read, on one line;  explained : how each column was read
-    """
+    """Forces of a file, in the order of the scene's asperities."""
 
     path: Path
     values: Array
-    status: NDArray[np.str_] | None
-    note: str
-    explained: list[str]
+    status: NDArray[np.str_] | None  # (n,) the statuses in the file, if it has such a column
+    note: str  # how the file was read, on one line
+    explained: list[str]  # how each column was read
 
 
 def read_loads(path: Path, scene: Scene, how: Manner) -> Claimed:
-    """Loads [force] from a file; negative loads down to -`floor` are accepted.
-
-    Rows are assigned to asperities by position, if the file has positions, else by an index, else
-    by the order of the scene. Pressures, with areas or on a regular grid, are integrated over the
-    points nearest to each asperity.
-
-    Raises TableError, which lists every mistake, or FileError if the file cannot be read.
-    """
+    """Loads [force] from a file, of rows that are assigned to asperities by position, else by an
+    index, else in order; pressures are integrated over the points nearest to each asperity."""
     return _read(path, scene, "load", how, how.floor)
 
 
@@ -126,13 +104,7 @@ def judged(
     floor: float = 0.0,
     force: float = 0.0,
 ) -> list[Claim]:
-    """The verdict on loads and, if shear forces are given, that on the shear forces.
-
-    within : largest error allowed, as a fraction of the largest load or shear force
-    force  : [force] the prescribed sum of the shear forces
-
-    Error messages name the file.
-    """
+    """The verdict on loads and, if any are given, that on shear forces with the sum `force`."""
     tolerance("--within", within)
     with blamed_on(loads.path):
         verdict = verify_on(problem, loads.values, within=within, floor=floor)
@@ -158,8 +130,7 @@ def _claimed_to_slide(forces: Claimed, contact: Contact) -> NDArray[np.bool_] | 
     for i in np.flatnonzero(wrong) if not mistakes else ():
         found = f'found "{said[i]}" at asperity {i}, which is proved {contact.status[i]}'
         mistakes.append(f"column status: {found}")
-    if mistakes:
-        raise TableError(str(forces.path), few(mistakes))
+    refuse(forces.path, mistakes)
     by_force = claims_sliding(contact, forces.values)
     return np.where(said == "undecided", by_force, said == "sliding")
 
@@ -183,8 +154,7 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
     if summed and not given:
         expected = f"both, of nodes or pixels{unused(table)}"
         mistakes.append(f"columns: found neither x nor y, expected {expected}")
-    if mistakes:
-        raise TableError(str(path), mistakes)
+    refuse(path, mistakes)
     read = name if name in columns else "pressure"
     areas = _areas(path, table, len(scene)) if read == "pressure" else 1.0
     values = columns[read] * areas * (how.sign if name == "load" else 1)
@@ -201,8 +171,7 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
         place.mistakes += _negative(forces if summed else values, floor, how.sign, read, mistake)
         if name == "load" and not summed:
             place.mistakes += _contradicted(values, floor, table)
-    if place.mistakes:
-        raise TableError(str(path), few(place.mistakes))
+    refuse(path, place.mistakes)
     status = None
     if "status" in columns:
         status = np.full(len(scene), "open", dtype=np.result_type(columns["status"], "U4"))
@@ -221,10 +190,8 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
 def _negative(
     loads: Array, floor: float, sign: float, name: str, mistake: Callable[[int, str], str]
 ) -> Iterator[str]:
-    """A message for each load below -floor, or one for the column if no load is positive.
-
-    name : the column;  mistake : a function that adds the row to a message
-    """
+    """A message, in which `mistake` names the row, for each load below -floor; or one for the
+    column `name` if no load is positive."""
     if not len(bad := np.flatnonzero(loads < -floor)):
         return
     hint, largest, least = "", float(loads.max()), -float(loads[bad].min())
@@ -267,7 +234,7 @@ def _not_compared(table: ReadTable, loaded: NDArray[np.bool_]) -> Iterator[str]:
     for header, entries, known in _statuses(table):
         other = ~np.isin(np.char.lower(entries), (*known, "", "undecided"))
         if other.any():
-            here, there = (sorted(set(entries[other & rows]))[:MOST] for rows in (loaded, ~loaded))
+            here, there = (sorted(set(entries[other & rows]))[:3] for rows in (loaded, ~loaded))
             with_load, without = (" or ".join(each) or "nothing" for each in (here, there))
             yield f"column {header} not compared ({with_load} with a load, {without} without)"
 
@@ -284,21 +251,22 @@ def _of_another_scene(table: ReadTable, scene: Scene, owners: Indices) -> Iterat
 
 
 def _areas(path: Path, table: ReadTable, count: int) -> Any:
-    """(m,) the areas of the nodes, or the area of one pixel of a regular grid.
-
-    count : number of asperities of the scene
-    """
+    """(m,) the areas of the nodes, or the area of one pixel of a regular grid."""
     columns = table.columns
     if "area" in columns:
         areas = columns["area"]
         wrong = np.flatnonzero((areas < 0) | ((areas == 0) & (columns["pressure"] != 0)))
         said = ", column area: found {:g}, expected a positive number"
-        if mistakes := [table.mistake(i, said.format(areas[i])) for i in wrong.tolist()]:
-            raise TableError(str(path), few(mistakes))
+        refuse(path, [table.mistake(i, said.format(areas[i])) for i in wrong.tolist()])
         return areas
     try:
         (i, dx), (j, dy) = (steps(name, columns[name]) for name in ("x", "y"))
-        _check_one_size(i, j, count)
+        if len(i) < (i.max() + 1) * (j.max() + 1):  # not a full grid
+            pixels = np.column_stack((i, j))
+            # Up to `count` may be alone: the contact of each asperity may be one pixel large.
+            alone = pixels[nearest_distances(pixels.astype(np.float64)) > 1.5]
+            if len(alone) > count and (np.gcd.reduce(alone - alone[0]) > 1).all():
+                raise InputError("x, y", found="pixels of several sizes", expected="one size")
         _check_whole(i, j, columns["pressure"] != 0)
     except InputError as error:
         expected = f"a column 'area', or x and y on a regular grid: {error.what} {error.found}"
@@ -307,26 +275,9 @@ def _areas(path: Path, table: ReadTable, count: int) -> Any:
     return dx * dy * (1 if np.ptp((i + j) % 2) else 2)
 
 
-def _check_one_size(i: Indices, j: Indices, count: int) -> None:
-    """Raise InputError if pixels have several sizes.
-
-    They do if more than `count` pixels have no neighbours, and these pixels lie on a coarser grid.
-    Up to `count` may be alone, because the contact of each asperity may be one pixel large.
-    """
-    if len(i) == (i.max() + 1) * (j.max() + 1):
-        return  # a full grid
-    pixels = np.column_stack((i, j))
-    alone = pixels[nearest_distances(pixels.astype(np.float64)) > 1.5]
-    if len(alone) > count and (np.gcd.reduce(alone - alone[0]) > 1).all():
-        raise InputError("x, y", found="pixels of several sizes", expected="one size")
-
-
 def _check_whole(i: Indices, j: Indices, loaded: NDArray[np.bool_]) -> None:
-    """Raise InputError if a grid lacks points under pressure, as a coarser mesh does.
-
-    A missing point with pressure on both sides can be a gap between two contacts. So a grid line
-    counts only if it has more than half as many such points as points under pressure.
-    """
+    """Raise InputError if a grid lacks points under pressure, as a coarser mesh does."""
+    # A missing point with pressure on both sides can be a gap between two contacts (see GAPS).
     if not np.ptp((i + j) % 2):  # a hexagonal or diagonal grid: lines along its diagonals
         i, j = (i + j) // 2, (i - j - (i - j).min()) // 2
     missing = 0

@@ -30,37 +30,25 @@ if TYPE_CHECKING:
 #: Default of the largest error of a position in a file, as a fraction of the smallest spacing.
 POSITION_TOLERANCE = 1e-2
 
-#: Number of iterations that estimate a common shift of all nodes.
-REFINEMENTS = 5
-
-#: If rows are missing, at most this many shifts are tried; each moves the first row to another
-#: asperity.
-MOST_TRIED = 1000
+#: Iterations: that estimate a common shift of all nodes; that assign nodes to the discs of the last
+#: assignment; and, if rows are missing, shifts that move the first row to another asperity.
+REFINEMENTS, ROUNDS, MOST_TRIED = 5, 20, 1000
 
 #: The last row counts as the sum of the others up to this relative difference.
 TOTAL = 1e-4
 
-#: If at most this part of the loaded nodes is far from all asperities, only the positions of these
-#: nodes may be wrong; otherwise all positions may be wrong.
-FEW_FAR = 0.1
-
-#: Largest accepted distance of a loaded node from its nearest asperity, as a fraction of that
-#: asperity's distance from its neighbour. At 1 the node may be an asperity that the scene lacks.
-REACH = 0.9
+#: Distances of loaded nodes from their nearest asperities, as fractions of those asperities'
+#: distances from their neighbours: the largest accepted (at 1 the node may be an asperity that the
+#: scene lacks), and the largest accepted median (about 0.4 for random points). If more than FEW_FAR
+#: of the nodes are too far, all positions may be wrong, else only theirs.
+REACH, BY_CHANCE, FEW_FAR = 0.9, 0.25, 0.1
 
 #: At most this many unread columns are named, or compared with the positions of asperities.
 MOST_UNREAD = 8
 
-#: Positions of nodes are accepted up to this median of their distances from the nearest asperities,
-#: each as a fraction of that asperity's distance from its neighbour; about 0.4 for random points.
-BY_CHANCE = 0.25
-
 #: Numbers with signs of both kinds, of which the fewer reach this part of the others in size, are
 #: positions rather than loads.
 BOTH_SIGNS = 0.1
-
-#: Largest number of times that nodes are assigned to the discs which the last assignment gives.
-ROUNDS = 20
 
 #: Names of columns that can only be indices of asperities.
 SURELY_INDEX = ("index", "asperity")
@@ -71,24 +59,16 @@ Read = tuple[str, Array]
 
 @dataclass
 class Placing:
-    """The assignment of the rows of a table to asperities.
-
-    column : the name of the column of loads, pressures or forces
-    tolerance : [length] as in `Manner`
-    missing_open : True if asperities without a row are open
-    summed : True if rows are nodes or pixels, each of which belongs to one asperity
-    how    : how rows were assigned, in words
-    mistakes : messages about wrong rows
-    """
+    """The assignment of the rows of a table to asperities; more fields are those of `Manner`."""
 
     scene: Scene
     table: ReadTable
-    column: str
+    column: str  # the name of the column of loads, pressures or forces
     tolerance: float | None
     missing_open: bool
-    summed: bool
-    how: str = "in the scene's order"
-    mistakes: list[str] = field(default_factory=list)
+    summed: bool  # True if rows are nodes or pixels, each of which belongs to one asperity
+    how: str = "in the scene's order"  # how rows were assigned, in words
+    mistakes: list[str] = field(default_factory=list)  # messages about wrong rows
 
     @cached_property
     def points(self) -> Array | None:
@@ -97,10 +77,7 @@ class Placing:
         return np.column_stack((columns["x"], columns["y"])) if "x" in columns else None
 
     def owners(self, values: Array) -> Indices:
-        """(m,) the index of the asperity of each row; messages about wrong rows go to `mistakes`.
-
-        values : (m,) the loads or forces of the rows
-        """
+        """(m,) the index of the asperity of each row, with loads or forces `values`."""
         if self.summed:
             return self._nearest_to_each(values)
         found, by = self._numbered_or_in_order() if self.points is None else (self._matched(), True)
@@ -156,30 +133,29 @@ class Placing:
         return owners
 
     def _by_discs(self, values: Array, owners: Indices) -> tuple[Indices, Array]:
-        """(m,) the asperity of each node, and (n,) the radii of the contact discs under the sums.
+        """(m,) the asperity of each node, and (n,) the radii a_i of the discs under the sums.
 
-        A node at the distance r_i from asperity i belongs to the asperity with the least
-        r_i^2 - a_i^2, where a_i is the contact radius. So discs that do not overlap keep all of
-        their nodes, also those that are nearer to another asperity. The radii follow from the sums.
-        If a disc would reach beyond its neighbour, the nearest asperities are taken.
+        It has the least r_i^2 - a_i^2, with its distance r_i from the node. So discs that do not
+        overlap keep all of their nodes. If one reaches beyond its neighbour, the nearest are taken.
         """
         from scipy.spatial import cKDTree  # takes 0.1 s to import
 
-        assert self.points is not None
-        nearest = owners
-        for _ in range(ROUNDS):
+        def discs(owners: Indices) -> Array:
             loads = np.bincount(owners, values, minlength=len(self.scene)).clip(min=0.0)
-            radii, before = discs_of(self.scene, loads), owners
+            return discs_of(self.scene, loads)
+
+        assert self.points is not None
+        nodes, nearest = np.column_stack((self.points, np.zeros(len(owners)))), owners
+        for _ in range(ROUNDS):
+            radii, before = discs(owners), owners
             if (radii > self._apart).any():  # loads in a wrong unit
                 break
             height = np.sqrt(np.maximum(radii.max() ** 2 - radii**2, 0.0))
             raised = cKDTree(np.column_stack((self.scene.contact_points, height)))
-            nodes = np.column_stack((self.points, np.zeros(len(owners))))
             owners = np.asarray(raised.query(nodes)[1])
             if np.array_equal(owners, before):
                 return owners, radii
-        loads = np.bincount(nearest, values, minlength=len(self.scene)).clip(min=0.0)
-        return nearest, discs_of(self.scene, loads)
+        return nearest, discs(nearest)
 
     # By an index, or in order
 
@@ -206,18 +182,15 @@ class Placing:
         count = np.arange(len(self.scene))
         named, others = dict[str, Indices](), dict[str, Indices]()
         for name, cells in self.table.others.items():
-            if cells.dtype.kind != "f":
+            if cells.dtype.kind != "f" or (np.floor(cells) != cells).any():
                 continue
-            if not ((cells >= 0) & (cells < 2**53) & (np.floor(cells) == cells)).all():
+            if not ((cells >= 0) & (cells < 2**53)).all():
                 continue
             index = cells.astype(np.intp)
+            least, falls = index.min(), (np.diff(index) < 0).any()
             if is_index(name):
                 named[name] = index
-            elif (
-                (np.diff(index) < 0).any()
-                and index.min() <= 1
-                and np.array_equal(np.sort(index), count + index.min())
-            ):
+            elif falls and least <= 1 and np.array_equal(np.sort(index), count + least):
                 others[name] = index
         return named | others
 
@@ -334,10 +307,8 @@ class Placing:
         return POSITION_TOLERANCE * self._spacing if given is None else given
 
     def _fits(self, points: Array) -> bool:
-        """True if each point is at an asperity, and no two points are at the same one.
-
-        Nodes fit if they are nearer to asperities than random points, and not all near the same.
-        """
+        """True if each point is at an asperity, and no two points are at the same one; or if nodes
+        are nearer to asperities than random points, and not all near the same."""
         distances, owners = self._nearest(points)
         if not self.summed:
             return bool(distances.max() <= self._allowed) and len(np.unique(owners)) == len(owners)
@@ -384,7 +355,7 @@ class Placing:
         """The headers of x, y and the loads, quoted; numbers if there is no header."""
         return {name: quote(bare(self.table.called[name])) for name in ("x", "y", self.column)}
 
-    @cached_property
+    @property
     def _headed(self) -> bool:
         return not all(map(str.isdecimal, self._called.values()))
 
@@ -413,12 +384,8 @@ class Placing:
             found = f"found x, y 10^{power} times as large as the scene's"
             ways = _options("scale", dict.fromkeys("xy", f"{10.0**-power:g}"))
             if any(bare(self.table.called[name]) != self.table.called[name] for name in "xy"):
-                own = self.scene.units.length
-                ways = (
-                    "correct their units in the header"
-                    if own
-                    else f"{ways}, as the scene names no units"
-                )
+                nameless = f"{ways}, as the scene names no units"
+                ways = "correct their units in the header" if self.scene.units.length else nameless
             yield f"{found}, expected the scene's unit of length: {ways}", points * 10.0**-power
 
     def _shifted(self, points: Array) -> Iterator[Read]:
@@ -442,10 +409,8 @@ class Placing:
         yield self._moved(points, -shift)
 
     def _moved(self, points: Array, shift: Array) -> Read:
-        size = (0.1 if self.summed else 0.01) * min(
-            self._allowed, float(np.abs(shift).max())
-        ) or 1.0
-        digit = 10.0 ** math.floor(math.log10(size))
+        size = min(self._allowed, float(np.abs(shift).max())) * (0.1 if self.summed else 0.01)
+        digit = 10.0 ** math.floor(math.log10(size or 1.0))
         by = f"[{', '.join(f'{each + 0.0:.4g}' for each in np.round(-shift / digit) * digit)}]"
         by = f"about {by}" if self.summed else f"{by}, to within {self._allowed:.3g}"
         expected = "expected x, y relative to the sphere's axis: subtract the shift in the file"

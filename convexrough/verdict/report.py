@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 from xml.etree import ElementTree
 
@@ -19,11 +19,8 @@ from convexrough.record import rows_of
 from convexrough.scene.scene import Scene
 from convexrough.tabular.columns import aligned, bound, labelled
 
-#: Relative errors above this are printed in per cent.
-PERCENT = 1e-4
-
-#: A list on the terminal shows at most this number of asperities, and says how many more there are.
-MOST_LISTED = 10
+#: Relative errors above PERCENT are printed in per cent; lists have at most MOST_LISTED asperities.
+PERCENT, MOST_LISTED = 1e-4, 10
 
 
 def verdict_summary(claims: Sequence[Claim]) -> dict[str, Any]:
@@ -32,18 +29,13 @@ def verdict_summary(claims: Sequence[Claim]) -> dict[str, Any]:
     for key, claim in zip(("verdict", "shear_verdict"), claims, strict=False):
         names = ("holds", *claim.kinds, "undecided", "off", "suspects", "error", "total_given",
                  "total_prescribed", "within")  # fmt: skip
-        found = {name: getattr(claim, name) for name in names}
-        summary[key] = {
-            name: it.tolist() if isinstance(it, np.ndarray) else it for name, it in found.items()
-        }
+        found = ((name, getattr(claim, name)) for name in names)
+        summary[key] = {name: it.tolist() if np.ndim(it) else it for name, it in found}
     return summary | {"asperities": rows_of(asperity_columns(claims))}
 
 
 def asperity_columns(claims: Sequence[Claim]) -> dict[str, NDArray[Any]]:
-    """Columns by name, with an entry for each asperity: what is claimed, and what is proved.
-
-    claims : the claim about loads and, if shear forces are checked, the claim about shear forces
-    """
+    """Columns by name, with what is claimed, and what is proved, about each asperity."""
     loads, *sheared = claims
     x, y = loads.of.asperities.positions.T
     columns = {"index": np.arange(len(x)), "x": x, "y": y, **_columns(loads)}
@@ -86,22 +78,27 @@ def _size(claim: Claim) -> str:
 
 
 def describe_claim(claim: Claim, others: str = "") -> list[str]:
-    """Aligned lines about one claim: wrong and undecided statuses, errors, the total, suspects.
+    """Aligned lines about a claim; `others` follows the number of rows that a table leaves out."""
+    length, force = claim.of.units
+    units = {"x": length, "y": length, claim.one: force}
+    heads = [f"{each} [{unit}]" if unit else each for each, unit in units.items()]
+    nearby, points = claim.nearby(), claim.of.asperities.positions.tolist()
 
-    others : text printed after the number of rows that a table leaves out
-    """
-
-    def table(which: Indices) -> list[str]:
-        lines = _table(claim, which[:MOST_LISTED])
-        more = len(which) - MOST_LISTED
-        return [*lines, f"    and {more:,} more{others}"] if more > 0 else lines
+    def table(which: Indices) -> Iterator[str]:
+        rows: list[list[Any]] = [["index", *heads, "solution", "bound", "status"]]
+        for i in which[:MOST_LISTED]:
+            solution = None if nearby is None else float(nearby[0][i])
+            error = bound(float(claim.errors[i]))
+            rows.append([i, *points[i], float(claim.values[i]), solution, error, claim.status[i]])
+        if len(which):
+            yield from (f"    {line}" for line in aligned(rows))
+        if (more := len(which) - MOST_LISTED) > 0:
+            yield f"    and {more:,} more{others}"
 
     worst = np.argsort(-claim.errors, kind="stable")
-    lines = labelled([
-        ("result" if claim.one == "load" else claim.many, _proved(claim)),
-        ("wrong statuses", str(len(claim.wrongly_claimed) or "none")),
-    ])  # fmt: skip
-    lines[1:1] = [claim.basis] if claim.basis else []
+    lines = labelled([("result" if claim.one == "load" else claim.many, _proved(claim))])
+    lines += [claim.basis] if claim.basis else []
+    lines += labelled([("wrong statuses", str(len(claim.wrongly_claimed) or "none"))])
     for what, which in claim.wrong.items():
         if len(which):
             lines += [f"  {what}: {len(which):,}", *table(worst[np.isin(worst, which)])]
@@ -126,16 +123,12 @@ def reason(claim: Claim) -> str:
 
 
 def junit(found: Sequence[Claim] | ConvexroughError, files: str) -> bytes:
-    """JUnit XML with a test case for each check of each claim, or with one case for an error.
-
-    files : names of the files that were checked, for the names of the test suite and its cases
-    """
+    """JUnit XML about `files`, with a case for each check of each claim, or one for an error."""
     suite = ElementTree.Element("testsuite", name=f"convexrough verify {files}")
-    if isinstance(found, ConvexroughError):
-        kind, cases = "error", {"input": str(found)}
-    else:
-        kind, cases = "failure", {f"{it.many}: {name}": text for it in found
-                                  for name, text in _findings(it).items()}  # fmt: skip
+    kind, cases = "error", {"input": str(found)}
+    if not isinstance(found, ConvexroughError):
+        named = ((it.many, *each) for it in found for each in _findings(it).items())
+        kind, cases = "failure", {f"{many}: {name}": text for many, name, text in named}
     for name, text in cases.items():
         case = ElementTree.SubElement(suite, "testcase", classname=suite.get("name", ""), name=name)
         if text:
@@ -145,8 +138,7 @@ def junit(found: Sequence[Claim] | ConvexroughError, files: str) -> bytes:
         suite.set(f"{each}s", str(len(suite.findall(f"*/{each}"))))
     root = ElementTree.Element("testsuites")
     root.append(suite)
-    written: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
-    return written
+    return bytes(ElementTree.tostring(root, encoding="utf-8", xml_declaration=True))
 
 
 def _findings(claim: Claim) -> dict[str, str]:
@@ -163,22 +155,6 @@ def _findings(claim: Claim) -> dict[str, str]:
         "off": "" if claim.near_enough else _off(claim),
         "total": "" if claim.total_holds else _total(claim, ""),
     }
-
-
-def _table(claim: Claim, which: Indices) -> list[str]:
-    if len(which) == 0:
-        return []
-    length, force = claim.of.units
-    names = {"x": length, "y": length, claim.one: force}
-    named = [f"{each} [{unit}]" if unit else each for each, unit in names.items()]
-    nearby, points = claim.nearby(), claim.of.asperities.positions.tolist()
-    rows = [
-        (i, *points[i], float(claim.values[i]), None if nearby is None else float(nearby[0][i]),
-         bound(float(claim.errors[i])), claim.status[i])
-        for i in which
-    ]  # fmt: skip
-    table = aligned([["index", *named, "solution", "bound", "status"], *rows])
-    return [f"    {line}" for line in table]
 
 
 def _off(claim: Claim) -> str:

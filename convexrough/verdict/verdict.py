@@ -38,11 +38,7 @@ NOISE = 1e-6
 class Verdict(Claim, Table, Plottable):
     """Comparison of claimed loads with what is proved. Indices refer to the scene's asperities.
 
-    scene       : the scene of the loads
-    loads       : (n,) [force] the given loads
-    floor       : [force] a load up to this size counts as 0: its asperity is claimed to be open
-    within      : largest error allowed: of a load, as a fraction of the largest load; of the sum,
-        as a fraction of a prescribed total
+    scene, loads, floor, within : as in `verify`
     total_prescribed : [force] the prescribed total load; None if the approach is prescribed
     certificate : certificate of the given loads, with 0 for loads up to the floor
     solution    : the contact that Newton's method finds from the given loads or, if it fails, from
@@ -160,11 +156,7 @@ def verify(
 
 
 def verify_on(
-    problem: NormalProblem,
-    loads: ArrayLike,
-    *,
-    within: float = WITHIN,
-    floor: float = 0.0,
+    problem: NormalProblem, loads: ArrayLike, *, within: float = WITHIN, floor: float = 0.0
 ) -> Verdict:
     """The verdict of `verify` for an assembled problem."""
     floor = checks.non_negative("floor", floor)

@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from convexrough.surface.hills import hills
+from convexrough.surface.pixels import hills
 
 Map = NDArray[np.float64]
 Place = tuple[int, int]

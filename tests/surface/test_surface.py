@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import convexrough as cr
-from convexrough.surface.holes import filled
+from convexrough.surface.pixels import filled
 
 RNG = np.random.default_rng(5)
 NOISE = 1e-3 * RNG.standard_normal((40, 60))

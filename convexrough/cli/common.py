@@ -23,53 +23,56 @@ DONE, UNHEARD, WRONG_INPUT, NOT_CERTIFIED, SOLVER_FAILED, INTERRUPTED = 0, 1, 2,
 
 PATH = click.Path(path_type=Path)
 
-#: Formats of figures.
-FORMATS = ("png", "svg", "pdf")
+Decorator = Callable[[Callable[..., int]], Callable[..., int]]
 
 
-def _formats(given: str) -> tuple[str, ...]:
-    formats = tuple(dict.fromkeys(each.strip().lower() for each in given.split(",")))
-    if unknown := [each for each in formats if each not in FORMATS]:
-        raise click.BadParameter(f"found {unknown[0]!r}, expected {', '.join(FORMATS)}")
+def option(usage: str, text: str, kind: Any = None, *, name: str = "", **more: Any) -> Decorator:
+    """A decorator that adds an option. Without a value in its usage and a kind, it is a flag.
+
+    usage, text : as in the help, such as "--load P";  name : of the argument, if not that of usage
+    """
+    flag, _, value = usage.partition(" ")
+    names = (flag, name) if name else (flag,)
+    how: dict[str, Any] = {"is_flag": True} if kind is None and not value else {"type": kind}
+    return click.option(*names, help=text, metavar=value or None, **how, **more)
+
+
+def _formats(*given: Any) -> tuple[str, ...]:
+    """The value of --formats as a tuple: `given` is a context, an option and its text."""
+    formats = tuple(dict.fromkeys(each.strip().lower() for each in given[-1].split(",")))
+    if unknown := [each for each in formats if each not in ("png", "svg", "pdf")]:
+        raise click.BadParameter(f"found {unknown[0]!r}, expected png, svg, pdf")
     return formats
 
 
-def _from_here(given: tuple[str, ...]) -> tuple[str, ...]:
+def _from_here(*given: Any) -> Any:
     """The solvers of --solver. This call makes modules of the current folder importable."""
-    if given and "" not in sys.path:
+    if given[-1] and "" not in sys.path:
         sys.path.insert(0, "")
-    return given
+    return given[-1]
 
 
-solver_option = click.option(
-    "--solver", "solvers", metavar="NAME", multiple=True,
-    callback=lambda *given: _from_here(given[-1]),
-    help="A solver of the package, or the import path of your class, such as mine.Solver; may be "
-    "repeated.",
+solver_option = option(
+    "--solver NAME", "A solver of the package, or the import path of your class, such as "
+    "mine.Solver; may be repeated.", name="solvers", multiple=True, callback=_from_here
 )  # fmt: skip
 
 #: The options for the place and the form of results, in the order of the help.
 OPTIONS = {
-    "proof": click.option(
-        "--proof", is_flag=True, help="Write proof.json, which `convexrough check` verifies."),
-    "html": click.option(
-        "--html", is_flag=True, help="Also write slider.html, an interactive page."),
-    "formats": click.option(
-        "--formats", metavar="LIST", default="png", show_default=True,
-        callback=lambda *given: _formats(given[-1]), help="Formats of figures: png, svg, pdf."),
-    "dpi": click.option(
-        "--dpi", type=click.IntRange(50, 600), default=200, show_default=True,
-        help="Pixels per inch of figures."),
-    "out": click.option("--out", metavar="DIR", type=PATH, help="Folder for the results."),
-    "no_figures": click.option("--no-figures", is_flag=True, help="Do not write figures."),
-    "force": click.option(
-        "--force", is_flag=True, help="Replace the files of an earlier run."),
-    "as_json": click.option(
-        "--json", "as_json", is_flag=True, help="Print one JSON object instead of text."),
+    "proof": option("--proof", "Write proof.json, which `convexrough check` verifies."),
+    "html": option("--html", "Also write slider.html, an interactive page."),
+    "formats": option("--formats LIST", "Formats of figures: png, svg, pdf.",
+                      default="png", show_default=True, callback=_formats),
+    "dpi": option("--dpi", "Pixels per inch of figures.",
+                  click.IntRange(50, 600), default=200, show_default=True),
+    "out": option("--out DIR", "Folder for the results.", PATH),
+    "no_figures": option("--no-figures", "Do not write figures."),
+    "force": option("--force", "Replace the files of an earlier run."),
+    "as_json": option("--json", "Print one JSON object instead of text.", name="as_json"),
 }  # fmt: skip
 
 
-def output_options(*names: str) -> Callable[[Callable[..., int]], Callable[..., int]]:
+def output_options(*names: str) -> Decorator:
     """A decorator that adds these `OPTIONS`; the first argument of the command is an `Output`."""
 
     def add(command: Callable[..., int]) -> Callable[..., int]:
@@ -78,9 +81,10 @@ def output_options(*names: str) -> Callable[[Callable[..., int]], Callable[..., 
             own = {name: given.pop(name) for name in names}
             return command(Output(**own), **given)
 
+        added: Callable[..., int] = called
         for name in reversed(names):
-            called = OPTIONS[name](called)
-        return called
+            added = OPTIONS[name](added)
+        return added
 
     return add
 
@@ -132,10 +136,7 @@ class Output:
         return DONE if all(result.certified for result in results) else NOT_CERTIFIED
 
     def proved(self, work: Callable[[], Proof], folder: Path) -> Proof | None:
-        """The proof, also written to `folder`; None without --proof.
-
-        If there is no proof, the result is None, and a warning states the reason.
-        """
+        """The proof, also written to `folder`; None, with a warning, if there is none."""
         if not self.proof:
             return None
         try:
@@ -166,10 +167,7 @@ def say_aside(*parts: str) -> None:
 
 @contextmanager
 def progress(message: str) -> Iterator[None]:
-    """Show a status line while the body of `with` runs, if standard error is a terminal.
-
-    The line also shows the records of the logger `convexrough`.
-    """
+    """Show a line on a terminal, with records of our logger, while the body of `with` runs."""
     if not sys.stderr.isatty():
         yield
         return
