@@ -145,7 +145,7 @@ def test_an_array_that_ends_inside_the_contact_is_told() -> None:
         (wide, 1.0, {"approach": 9e-5}, "100% of the asperities at the rim of the array touch; as"),
         (wide, 1.0, {"approach": 5e-5}, ""),
         (wide, np.inf, {"approach": 1e-6}, ""),
-        (wide, 1.0, {"approach": -1e-6}, "no asperity carries a load: check the sign and the unit"),
+        (wide, 1.0, {"approach": -1e-6}, "no asperity carries a load: check the sign and unit"),
         (few, 1.0, {"approach": 1e-5}, ""),
         (few, 1.0, {"approach": 1.5e-5}, "100% of the asperities at the rim"),
         (square, 1.0, {"approach": 7e-5}, "75% of the asperities at the rim"),
