@@ -107,7 +107,7 @@ def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
             f"{HIGH_FRICTION:g}; it is a ratio, not in per cent"
         )
     if normal["contact"] == 0:
-        yield "no asperity carries a load: check the sign and unit of the approach, or the solver"
+        yield "no asperity carries a load: check the sign and unit of the approach"
     elif normal["contact"] < FEW:
         yield (
             f"asperities in contact: {normal['contact']}, fewer than {FEW}: too few for a rough "

@@ -44,8 +44,8 @@ def elliptic_path(
     phase  : [rad] from -pi to pi; at pi/2 P and Q are in phase, and the ellipse is a straight line
     friction : coefficient of friction f of the scene. The extremes of P, P + Q/f and P - Q/f are
         points of the path, so `Cycle.level` is that of the ellipse
-    chords : approximate number of chords that replace the ellipse. The loss along the chords is
-        smaller than that of the ellipse; the difference falls as 1 / chords^2
+    chords : approximate number of chords that replace the ellipse. The loss along the chords
+        differs from that along the ellipse by a fraction that falls as 1 / chords^2
 
     Raises InputError if the phase is not from -pi to pi, or if `friction` is not positive.
 

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property, partial
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,7 +97,7 @@ class LatticeInfluence(coupling.Influence):
         if last[0] < reach:
             self._kept.clear()  # transforms of kernels on the last box
             box = replace(box, extent=box.extent / 2.0 + reach)
-            last = self._cached("boxed", lambda: (reach, box, i * np.intp(box.stride) + j))
+            last = self._keep("boxed", (reach, box, i * np.intp(box.stride) + j))
         return last[1:]
 
     @property
@@ -147,8 +147,8 @@ class LatticeInfluence(coupling.Influence):
 
     @property
     def _least(self) -> float:
-        """[spacing] lower bound on the shortest distance between two points."""
-        return 1.0 - min(self.site_error, 0.5)
+        """[spacing] lower bound on the shortest distance between two points; nearly 1."""
+        return 1.0 - self.site_error
 
     @property
     def _displaced(self) -> float:
@@ -188,9 +188,10 @@ class LatticeInfluence(coupling.Influence):
 
     def restricted(self, which: Indices) -> LatticeInfluence:
         members = self.members[which]
-        if "part" in self._kept and not np.array_equal(self._kept["part"].members, members):
-            del self._kept["part"]
-        return self._cached("part", lambda: replace(self, members=members))
+        part: LatticeInfluence | None = self._kept.get("part")
+        if part is None or not np.array_equal(part.members, members):
+            part = self._keep("part", replace(self, members=members))
+        return part
 
     def onto(self, points: Array) -> coupling.Coupling:
         places = self.lattice.sites(points)
@@ -204,7 +205,7 @@ class LatticeInfluence(coupling.Influence):
 
     def slopes(self, loads: Array) -> Array:
         box, places = self._boxed_for(loads)
-        pulls = self._cached("pulls", lambda: box.pulls(coupling.cubed))
+        pulls = self._on(box, "pulls", lambda: box.pulls(coupling.cubed))
         each = [box.convolve_at(places, loads, 1j * pull.spectrum) for pull in pulls]
         return -self.scale / self.lattice.spacing**2 * np.stack(each, axis=1)
 
@@ -262,19 +263,23 @@ class LatticeInfluence(coupling.Influence):
         slices = slices or SLICES + int(math.prod(self.box.shape) > MANY)
         box, places = self._boxed_for(np.asarray(loads.high))
         off_sites = self._off_sites(np.asarray(loads.high), box, places)
-        sliced = self._cached(slices, lambda: self._slice(box, slices))
+        sliced = self._on(box, slices, lambda: self._slice(box, slices))
         return sliced.sums(loads, places) + off_sites
 
-    def _cached(self, name: object, make: Callable[[], Made]) -> Made:
-        """The object that `make` returns, computed once unless there are many asperities."""
-        made: Made = self._kept[name] if name in self._kept else make()
+    def _on(self, box: SiteBox, name: object, make: Callable[[], Made]) -> Made:
+        """The object on this box that `make` returns; threads can use other boxes meanwhile."""
+        of, made = self._kept.get(name, (None, None))
+        return cast(Made, made) if of is box else self._keep(name, (box, make()))[1]
+
+    def _keep(self, name: object, made: Made) -> Made:
+        """The same object, kept in `_kept` unless there are many asperities."""
         if len(self) <= MOST_KEPT:
             self._kept[name] = made
         return made
 
     @cached_property
     def _kept(self) -> dict[object, Any]:
-        """By name: kernels on the last box of `_boxed_for`, this box, and the last `restricted`."""
+        """By name: the last box of `_boxed_for`, kernels with their box, the last `restricted`."""
         return {}
 
     def _slice(self, box: SiteBox, count: int) -> Sliced:
@@ -299,7 +304,7 @@ class LatticeInfluence(coupling.Influence):
         if most + unknown == 0.0 or top == 0.0:
             return Ball.exact(np.zeros(len(self)))
         shares = loads / top
-        pulls = self._cached("pulls", lambda: box.pulls(coupling.cubed))
+        pulls = self._on(box, "pulls", lambda: box.pulls(coupling.cubed))
 
         def pull(waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
             along, across = (1j * kernel.spectrum[:, each] for kernel in pulls)

@@ -168,7 +168,8 @@ def box_of_touching(
     number = convexity_number(shells, h)
     if not number < 1:
         if influence.stored or len(which) <= FACTORISED:
-            margin = largest(CROWDED_MARGINS, lambda mu: convex_margin(influence, own, (mu,)) > 0)
+            scaled, error = _scaled(influence, own)
+            margin = largest(CROWDED_MARGINS, lambda mu: proved_margin(scaled, (mu,), error) > 0)
         else:
             margin = overlapping_margin(influence, influence.scale / own, CROWDED_MARGINS)
         number = 1.0 - margin
@@ -181,9 +182,14 @@ def convex_margin(influence: Influence, compliance: Array, margins: Sequence[flo
     """The first mu of `margins` for which Cholesky's factorisation proves  H + A >= mu H,  with the
     diagonal H of `compliance`; 0 if there is none.
     """
+    scaled, error = _scaled(influence, compliance)
+    return proved_margin(scaled, margins, error)
+
+
+def _scaled(influence: Influence, compliance: Array) -> tuple[Array, float]:
+    """H^-1/2 A H^-1/2 with H = diag(`compliance`), and a bound on its relative errors."""
     root = 1.0 / np.sqrt(compliance)
-    scaled: Array = influence.matrix * root * root[:, None]
-    return proved_margin(scaled, margins, influence.entry_error + 8 * ROUNDOFF)
+    return influence.matrix * root * root[:, None], influence.entry_error + 8 * ROUNDOFF
 
 
 def crowded(problem: NormalProblem, loads: Array) -> Indices:

@@ -116,14 +116,16 @@ class NormalProblem:
 
     def _at(self, control: Ball, by_load: bool) -> Self:
         other = replace(self, control=control, by_load=by_load)
-        for name in ("exact", "row_norm", "largest_entry", "squares"):
+        for name in ("exact", "row_norm", "largest_entry"):
             other.__dict__[name] = getattr(self, name)
+        if "squares" in self.__dict__:
+            other.__dict__["squares"] = self.squares
         return other
 
     @cached_property
     def squares(self) -> Array:
         """(n,) [length^2] squared distances of the summits from the axis."""
-        return self.scene.asperities.distances[self.candidates] ** 2
+        return frozen(self.scene.asperities.distances[self.candidates] ** 2)
 
     @cached_property
     def places(self) -> Indices:

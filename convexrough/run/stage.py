@@ -211,7 +211,8 @@ class Result(Record):
     def tables(self) -> dict[str, Columns]:
         """The tables to write: for each file name without its ending, the columns by name."""
         rows = self.known
-        return {self.name: {key: np.array([row[key] for row in rows]) for key in rows[0]}}
+        keys = rows[0] if rows else ()
+        return {self.name: {key: np.array([row[key] for row in rows]) for key in keys}}
 
     def at_asperities(self, columns: Columns) -> Columns:
         """A table with a row for each asperity: its position x and y, and these columns."""

@@ -45,7 +45,8 @@ class Lattice(Cached):
     def shrunk(self, along_x: Fraction, along_y: Fraction) -> Lattice | None:
         """The lattice of points whose coordinates are multiplied by these factors of at most 1.
 
-        None if the new basis is not reduced. The new `site_error` includes rounding errors.
+        None if the new basis is not reduced, or if points are too far from the new sites. The new
+        `site_error` includes rounding errors.
         """
         assert self.unshrunk is None
         times = np.array([float(along_x), float(along_y)])
@@ -54,7 +55,8 @@ class Lattice(Cached):
         if 2.0 * abs(a @ b) > min(a @ a, b @ b) * (1.0 + 1e-9):
             return None
         site_error = 2.0 * float(times.max()) * self.site_error
-        return Lattice(times * self.origin, basis, site_error, (along_x, along_y), self.basis)
+        made = Lattice(times * self.origin, basis, site_error, (along_x, along_y), self.basis)
+        return made if site_error <= 4.0 * CLOSEST * made.spacing else None
 
     @property
     def exactly(self) -> list[list[Fraction]]:

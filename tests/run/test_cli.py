@@ -150,7 +150,7 @@ def test_a_run_says_what_the_package_says(run: Any, command: Any) -> None:
     printed = run(text).out
     assert re.search(r"^ *0\.5 .* 6 +31 +0$", printed, re.M)
     assert "indentations increase with the load: proved" in printed
-    assert printed.count("those of 12 chords; the loss along the ellipse is larger: use") == 1
+    assert printed.count("those of 12 chords; the loss along the ellipse differs: use") == 1
 
 
 SWEEP = """

@@ -183,7 +183,7 @@ def test_what_is_not_proved_is_said() -> None:
     graze["normal"] = {}
     table = swept(graze)
     said = "not certified: undecided asperities: 1; "
-    said += "no asperity carries a load: check the sign and unit of the approach, or the solver"
+    said += "no asperity carries a load: check the sign and unit of the approach"
     assert numbers(table, "status", "message") == [["undecided", "certified"], [said, ""]]
 
 

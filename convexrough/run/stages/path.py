@@ -83,7 +83,7 @@ class _Points(Stage):
         if self.ellipse is None:
             return []
         said = f"losses and errors are those of {self.ellipse.chords} chords; the loss along the "
-        return [f"{said}ellipse is larger: use twice as many chords to see by how much"]
+        return [f"{said}ellipse differs: use twice as many chords to see by how much"]
 
 
 class PathStage(_Points):
