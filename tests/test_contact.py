@@ -62,11 +62,7 @@ def test_the_papers_example(kind: Kind) -> None:
 @pytest.mark.parametrize("control", ["approach", "load"])
 @pytest.mark.parametrize(("name", "kind"), CASES)
 def test_fifty_digits(name: str, kind: Kind, control: str) -> None:
-    """Loads and gaps against a proved multiprecision solution, and the bounds against the truth.
-
-    Measured, the largest over these scenes and both controls: of the largest load, loads are off by
-    8e-16 through the matrix and 3e-15 through transforms; each of itself, by 3e-15 and 2e-14.
-    """
+    """Loads and gaps against a proved multiprecision solution, and the bounds against the truth."""
     scene, approach = NAMED[name]
     given = prescribed(scene, approach, control)
     contact = cr.press(scene, **given, influence=kind)
@@ -96,11 +92,7 @@ def test_fifty_digits(name: str, kind: Kind, control: str) -> None:
 @pytest.mark.sample(3)
 @pytest.mark.parametrize("name", NAMED)
 def test_statuses_do_not_depend_on_the_operator(name: str) -> None:
-    """Nor do loads, to within what is proved of each; nor does it matter which solver found them.
-
-    What a solver knows of its loads saves work, and hardly changes what is proved. Balls that are
-    subtracted count underflow: a load that is known to be 0 is so to 1e-300 of the total.
-    """
+    """Nor do loads, to within what is proved of each; nor does it matter which solver found them."""
     scene, approach = NAMED[name]
     first, *others = (
         cr.press(scene, approach=approach, influence=kind) for kind in operators(scene)

@@ -22,10 +22,7 @@ def contact(request: pytest.FixtureRequest) -> cr.Contact:
 
 
 def on_circles(contact: cr.Contact, fraction: float, angles: int = 7) -> Any:
-    """Points on a circle about each touching asperity, of a fraction of its contact radius.
-
-    (touching, angles, 2)
-    """
+    """Points on a circle about each touching asperity, of a fraction of its contact radius."""
     touching = contact.loads > 0
     centres, a = contact.scene.contact_points[touching], contact.contact_radii[touching]
     phi = 0.1 + 2 * np.pi * np.arange(angles) / angles

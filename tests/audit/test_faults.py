@@ -1,9 +1,4 @@
-"""Commands that are killed, out of room or in each other's way, and spoiled files of every kind.
-
-By default 2 trials of `run` without figures and `new`, and 18 fresh mutants, which get an answer or
-a clear error, in time and in the memory they warrant; with --full 300 trials of all commands, and
-3,000 mutants. Each batch is a process of its own under limits of memory and processor time.
-"""
+"""Commands that are killed, out of room or in each other's way, and spoiled files of every kind."""
 
 import json
 import os
@@ -74,15 +69,3 @@ def test_what_a_killed_process_left_is_removed_by_the_next(tmp_path: Path, comma
         path.write_text("mine")
     remove_unfinished(folder)
     assert all(path.exists() for path in kept)
-
-
-@forks
-def test_new_on_a_full_disk_leaves_nothing(tmp_path: Path) -> None:
-    limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100)); "
-    code = limit + "from convexrough.cli import main; raise SystemExit(main(['new', 'a.toml']))"
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 2
-    assert done.stderr == "convexrough: error: a.toml: cannot be written: File too large\n"
-    assert list(tmp_path.iterdir()) == []

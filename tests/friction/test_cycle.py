@@ -70,11 +70,7 @@ def test_three_ways_to_the_energy(name: str) -> None:
 
 
 def plain_history(contact: cr.Contact, forces: list[float]) -> list[float]:
-    """Displacements by an independent model: elastic-slider elements fitted to first loading.
-
-    Any concave first-loading curve is that of springs with sliders in parallel; their displacement
-    control obeys Masing and memory by construction. The force is inverted by bisection.
-    """
+    """Displacements by an independent model: elastic-slider elements fitted to first loading."""
     limit = limit_of(contact)
     grid = np.concatenate(([0.0], limit * (1 - np.linspace(1, 0, 80) ** 2)))[1:]
     path = cr.history(contact, forces=grid)

@@ -1,8 +1,4 @@
-"""Order is proved where no indentation falls, and never where one is seen to.
-
-The judges are the levels in between, and the rates (I + A C)^-1 1 of numpy at stiffnesses within
-the bounds of the proof.
-"""
+"""Order is proved where no indentation falls, and never where one is seen to."""
 
 from fractions import Fraction
 from itertools import pairwise
@@ -71,10 +67,7 @@ def test_order_of_thousands_is_proved_without_an_inverse() -> None:
 @pytest.mark.parametrize("aim", [0.5, 0.9, 1.0, 1.5, 2.0, 2.5])
 @pytest.mark.parametrize("seed", range(5))
 def test_order_of_random_layouts(seed: int, aim: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Proved where contacts are far apart and no indentation falls, and never where one does.
-
-    The same holds without an inverse, by sweeping.
-    """
+    """Proved where contacts are far apart and no indentation falls, and never where one does."""
     contact = random_contact(seed, aim)
     levels, down = levels_of(contact), falls(contact)
     found = levels.order([NOTHING])

@@ -127,10 +127,7 @@ def test_sheared_and_cycled(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["reversals-random", "reversals-nested"])
 def test_a_hundred_thousand_reversals(name: str, pytestconfig: pytest.Config) -> None:
-    """The last of them wipes all others out; without --full some are left out before it.
-
-    Memory curves of nested ranges grow with their number, so `history` refuses all of them.
-    """
+    """The last of them wipes all others out; without --full some are left out before it."""
     case, contact = gallery.case(name), pressed(name)
     assert len(case.history) > 100_000
     most = (5_000 if "nested" in name else len(case.history)) if pytestconfig.option.full else 25

@@ -25,10 +25,7 @@ NAMES = ("heights", "tip_radii", "positions", "sphere_radius", "contact_modulus"
 def assert_both(
     contact: cr.Contact, force: float, holding: Holding, sharp: float, seed: int = 0
 ) -> None:
-    """Values and derivatives, of arrays along random signs and by two entries, and their bounds.
-
-    sharp : what no bound may exceed of the largest derivative of its kind; 0 for any
-    """
+    """Values and derivatives, of arrays along random signs and by two entries, and their bounds."""
     loss = cr.cycle(contact, maximum=force).gradient(holding=holding)
     moved = cr.shear(contact, force=force).gradient(displacement=1.0, holding=holding)
     assert max(loss.balance_defect, moved.balance_defect) < 1e-14

@@ -145,10 +145,7 @@ near_to = cache(lambda scene, load: cr.press(scene, load=load))
 
 
 def walked(contact: cr.Contact, steps: Any, start: Any, weights: Any) -> Callable[[Any, Any], Any]:
-    """From loads and forces, rational, to losses and displacements, in many digits.
-
-    By the pieces of the memory curve, with nothing else of the package.
-    """
+    """From loads and forces, rational, to losses and displacements, in many digits."""
 
     def value(setup: Setup, P: list[Fraction], Q: list[Fraction], f: Fraction) -> Any:
         levels: dict[Fraction, tuple[Any, Any]] = {}

@@ -32,10 +32,7 @@ def assert_spans(lattice: Lattice, basis: Array) -> None:
     st.floats(-9, 9),
 )
 def test_a_lattice_is_found(name: str, count: int, angle: float, shift: float, size: float) -> None:
-    """Turned, shifted by up to a million spacings, of any size; in a reduced basis.
-
-    The distance of each coordinate from its site is within the bound, in exact arithmetic.
-    """
+    """Turned, shifted by up to a million spacings, of any size; in a reduced basis."""
     basis = 10**size * turned(BASES[name], angle)
     points = lattice_patch(basis, max(count, 30 if name == "rectangular" else 9))
     points = points + 10**size * np.array([10**shift, -(10**shift)])

@@ -65,11 +65,7 @@ def loadings(count: int, rng: np.random.Generator) -> Array:
 @each_operator
 @pytest.mark.parametrize("seed", range(5))
 def test_products_and_sums(kind: str, layout: str, seed: int) -> None:
-    """Within their bounds, which are not absurd.
-
-    Off the axis, points in float64 are themselves off a lattice: a product then loses 6e-14 at 300
-    spacings. Its bound is 100 to 3000 times what is lost.
-    """
+    """Within their bounds, which are not absurd."""
     rng = np.random.default_rng(seed)
     A: Influence = operator(kind, layout, rng)
     rows, loads = rng.integers(0, len(A), 30), loadings(len(A), rng)
@@ -104,27 +100,6 @@ def test_products_and_sums(kind: str, layout: str, seed: int) -> None:
             assert radius.max() <= 0.1 * rounding.of(sizes).max()
 
 
-def assert_above(above: Array, true: Array, layout: str) -> None:
-    """Upper bounds that are mostly a few per cent too large."""
-    assert (above >= true).all()
-    if layout != "coincident":
-        assert (above <= 1.05 * true + 0.02 * np.median(true[true > 0])).all()
-
-
-@pytest.mark.sample(4)
-@each_operator
-@pytest.mark.parametrize("power", [2, 3])
-@pytest.mark.parametrize("seed", range(2))
-def test_upper_bounds(kind: str, layout: str, seed: int, power: int) -> None:
-    rng = np.random.default_rng(seed)
-    A = operator(kind, layout, rng)
-    rows = rng.integers(0, len(A), 40)
-    strengths = np.array([rng.random(len(A)), rng.random(len(A)) < 0.3], dtype=float)
-    true, _ = inverse_sums(A.points[rows], A.points, strengths.T, power=power)
-    for strength, each in zip(strengths, true.T, strict=True):
-        assert_above(A.falloff(strength, power)[rows], each, layout)
-
-
 @pytest.mark.sample(5)
 @each_operator
 @pytest.mark.parametrize("count", [0, 1, 2, 3, 40, 200])
@@ -154,22 +129,6 @@ def test_parts_and_other_points(kind: str, layout: str, seed: int, count: int) -
         for power in (2, 3):
             exactly, _ = inverse_sums(points, part.points, loads, power=power)
             assert (coupling.falloff(loads, power) >= exactly).all()
-
-
-@pytest.mark.sample(3)
-@pytest.mark.parametrize(
-    ("kind", "layout"), [c for c in CASES if c[0] == "lattice" or c[1] in EVEN]
-)
-@pytest.mark.parametrize("seed", range(2))
-def test_slopes(kind: str, layout: str, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    A = operator(kind, layout, rng)
-    loads, rows = rng.uniform(0.5, 1.0, len(A)), rng.integers(0, len(A), 100)
-    apart = A.points[rows, None] - A.points
-    pulls = SCALE * inverse_distances(A.points[rows], A.points) ** 3 * loads
-    true = -(pulls[..., None] * apart).sum(axis=1)
-    sizes = (pulls[..., None] * np.abs(apart)).sum(axis=1)
-    assert (np.abs(A.slopes(loads)[rows] - true) <= 1e-10 * sizes.max(axis=1)[:, None]).all()
 
 
 @pytest.mark.sample(20)

@@ -101,10 +101,7 @@ def test_paths_below_and_above_the_limit(angle: float | None) -> None:
 
 
 def test_a_limit_is_at_most_gross_sliding() -> None:
-    """No part of the contact lets go on these paths; the first leaves |Q| <= f P.
-
-    The last follows the load, so that nothing ever slides.
-    """
+    """No part of the contact lets go on these paths; the first leaves |Q| <= f P."""
     rises = np.array([0.0, 1.3 * P])
     limit = cr.shakedown(PAPER, load=P, load_amplitudes=rises, force_amplitudes=[0.03 * P] * 2)
     assert limit.factor == limit.gross == pytest.approx(0.5 / 0.03)
@@ -142,11 +139,7 @@ LEFT = 1e-5
 
 
 class Stuck:
-    """Asperities that stick until they slide, at constant load: |q_i| <= P_i, step by step.
-
-    Each step is Moreau's: the least (1/2) d'K d over forces q = before + d within friction that add
-    up. Its multipliers are the slips. Vectors, n of them, in the order x_1, y_1, ...
-    """
+    """Asperities that stick until they slide, at constant load: |q_i| <= P_i, step by step."""
 
     def __init__(self, stiffness: Array, limits: Array) -> None:
         self.K, self.P, self.q = stiffness, limits, np.zeros(2 * len(limits))
@@ -176,10 +169,7 @@ class Stuck:
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("kind", ["elastic", "vector"])
 def test_cycles_below_and_above_melans_limit(kind: Any) -> None:
-    """From a first loading that slides: slip dies out 1 % below, and goes on 1 % above.
-
-    Vectors turn towards the state at rest slowly: the slip of a cycle halves in some ten of them.
-    """
+    """From a first loading that slides: slip dies out 1 % below, and goes on 1 % above."""
     contact = cr.press(PAPER, load=P)
     problem = contact.cached(FrictionProblem)
     n = len(problem)
@@ -214,10 +204,7 @@ def test_cycles_below_and_above_melans_limit(kind: Any) -> None:
 def exact_shares(
     scene: cr.Scene, load: float, vector: bool, along: int
 ) -> tuple[list[arb], list[list[arb]]]:
-    """P_i and the forces Y_i under a unit force along x or y, in balls, without the package.
-
-    By the scalar kernel, or by Cerruti's tensor, c_t B = (1/pi G r) [(1 - nu) I + nu d d'].
-    """
+    """P_i and the forces Y_i under a unit force along x or y, in balls, without the package."""
     loads = solve_exactly(scene, load=load).loads
     touching = [i for i, each in enumerate(loads) if each > 0]
     points = [[arb(float(x)) for x in scene.asperities.positions[i]] for i in touching]

@@ -200,10 +200,7 @@ def test_gaps_of_screened_neighbours_that_nearly_coincide(seed: int) -> None:
 @pytest.mark.parametrize("control", ["approach", "load"])
 @pytest.mark.parametrize("kind", operators(paper()))
 def test_screened_asperities_are_open_whatever_the_loads(kind: Kind, control: str) -> None:
-    """With the whole load on one asperity, gaps are known to within more than themselves.
-
-    A load on an asperity that cannot touch is proved to be wrong by just that load.
-    """
+    """With the whole load on one asperity, gaps are known to within more than themselves."""
     scene = paper()
     given = prescribed(scene, 3e-5, control)
     candidates = NormalProblem.assemble(scene, **given).candidates

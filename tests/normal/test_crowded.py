@@ -235,10 +235,7 @@ def test_eight_thousand_on_a_lattice_have_one_solution() -> None:
 
 
 def test_poor_loads_of_a_prescribed_total_do_not_exclude_another_solution() -> None:
-    """Of a crowded pair far from a bank of asperities either one can touch.
-
-    The bound on the approach took the displacement of other loads than its weights.
-    """
+    """Of a crowded pair far from a bank of asperities either one can touch."""
     sites = np.array(
         [(i + 0.5 * j, j * np.sqrt(3) / 2) for i in range(-4, 5) for j in range(-4, 5)]
     )

@@ -24,10 +24,7 @@ def keys(value: Any) -> Any:
 def test_names_columns_and_keys(
     command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """All is solved before the first file is written.
-
-    After a deliberate change the folder of the test holds what to pin, as found.json.
-    """
+    """All is solved before the first file is written."""
     (tmp_path / "a.toml").write_text(scene_text(WITHIN, more=EVERYTHING))
     monkeypatch.setattr(plots, "save", lambda figure, path, *_: path.touch())
     with monkeypatch.context() as patch:

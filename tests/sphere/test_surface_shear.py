@@ -24,12 +24,7 @@ def displacement(r: Any, angle: Any, nu: float, share: float = 1.0) -> Any:
 
 
 def cerruti(r: float, angle: float, nu: float, a: float, q0: float) -> float:
-    """Both surfaces' displacement along x at (r, angle), from q0 sqrt(1 - r^2/a^2) on a disc.
-
-    Cerruti: a force at a distance s moves both surfaces by (1/(pi G s)) (1 - nu + nu cos^2 w), w
-    the angle of the line to it. In polar coordinates about the point, 1/s meets the area s ds dw:
-    what is left is the traction along each line through the point that cuts the disc.
-    """
+    """Both surfaces' displacement along x at (r, angle), from q0 sqrt(1 - r^2/a^2) on a disc."""
     roots, root_weights = np.polynomial.legendre.leggauss(40)
     if r < a:  # every line does
         w = np.pi * np.arange(400) / 400

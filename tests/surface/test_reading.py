@@ -70,14 +70,6 @@ def test_arrays(tmp_path: Path) -> None:
         raw(several, {"height": HEIGHTS, "z": 2 * HEIGHTS})
 
 
-@pytest.mark.parametrize(
-    ("separator", "ending"), [(" ", "\n"), ("\t", "\r\n"), (",", "\n"), (";", ";\n"), (", ", "\n")]
-)
-def test_matrices(tmp_path: Path, separator: str, ending: str) -> None:
-    content = matrix(separator=separator, ending=ending)
-    assert_array_equal(raw(tmp_path / "map.csv", content, pixel=1.0).heights, HEIGHTS)
-
-
 def test_what_gwyddion_writes(tmp_path: Path) -> None:
     head = "# Channel: Height\n# Width: 18.0 µm\n# Height: 21.0 µm\n# Value units: nm\n"
     surface = raw(tmp_path / "map.txt", head + matrix(1e2 * HEIGHTS, "\t"))

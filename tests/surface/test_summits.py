@@ -51,11 +51,7 @@ def test_the_map_has_the_moments_of_its_spectrum() -> None:
 
 
 def test_summits_are_as_a_gaussian_surface_has_them() -> None:
-    """Density, curvature and heights of all maxima against Nayak's theory.
-
-    Of waves no shorter than 16 pixels, over twelve seeds; the theory knows neither pixels nor the
-    least-squares fit, which take 3 % of the curvature.
-    """
+    """Density, curvature and heights of all maxima against Nayak's theory."""
     options = dict(hurst=0.8, rms_slope=0.1, rolloff=64.0, pixels=512, cutoff=16.0)
     exact = cr.surface.self_affine_moments(**options)  # type: ignore[arg-type]
     found = [

@@ -146,29 +146,6 @@ def test_not_certified_is_exit_status_three(find: Any) -> None:
 
 
 @pytest.mark.usefixtures("surface")
-def test_files_of_others_are_kept(command: Any) -> None:
-    """Only the files of an earlier run are replaced; a folder with an input is refused."""
-    Path("mine").mkdir()
-    for name in ("map.pdf", "provability.csv", "scan.npz"):
-        Path("mine", name).write_text("mine")
-    options = ("--out", "mine", "--formats", "png,pdf")
-    outcome = command("summits", "scan.npz", *options)
-    assert outcome.status == 2
-    assert "mine: not empty; --force replaces its results; or name another folder" in outcome.err
-    assert sorted(path.name for path in Path().iterdir()) == ["mine", "scan.npz", "scene.toml"]
-    assert command("summits", "scan.npz", "--out", "mine", "--no-figures", "--force").status == 0
-    assert Path("mine/map.pdf").read_text() == Path("mine/scan.npz").read_text() == "mine"
-    assert command("summits", "scan.npz", *options, "--force").status == 0
-    assert command("summits", "scan.npz", "--out", "mine", "--no-figures", "--force").status == 0
-    assert {path.name for path in Path("mine").iterdir()} == {
-        *("files.json", "provability.csv", "scan.npz", "summary.json", "summits.csv")
-    }
-    refused = command("summits", "scan.npz", "--out", ".", "--force")
-    assert refused.status == 2
-    assert "holds scan.npz, an input; name another folder" in refused.err
-
-
-@pytest.mark.usefixtures("surface")
 def test_a_long_table_is_written_as_npz(command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("convexrough.run.results.MOST_CSV_ROWS", 3)
     assert "summits.npz" in command("summits", "scan.npz", "--no-figures").out

@@ -1,7 +1,4 @@
-"""Whatever is killed, and whenever: nothing is half-written, and resuming gives the same table.
-
-One kill in every run of the tests; with --full, 30 of the command and 30 of its workers.
-"""
+"""Whatever is killed, and whenever: nothing is half-written, and resuming gives the same table."""
 
 import logging
 import os
