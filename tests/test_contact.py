@@ -92,7 +92,7 @@ def test_fifty_digits(name: str, kind: Kind, control: str) -> None:
 @pytest.mark.sample(3)
 @pytest.mark.parametrize("name", NAMED)
 def test_statuses_do_not_depend_on_the_operator(name: str) -> None:
-    """Nor do loads, to within what is proved of each; nor does it matter which solver found them."""
+    """Nor do loads, to within what is proved of each, whichever operator found them."""
     scene, approach = NAMED[name]
     first, *others = (
         cr.press(scene, approach=approach, influence=kind) for kind in operators(scene)

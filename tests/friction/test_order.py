@@ -88,35 +88,18 @@ def test_order_of_random_layouts(seed: int, aim: float, monkeypatch: pytest.Monk
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("moved", [0.0, 0.15])
-def test_swept_charges_against_all_asperities(seed: int, moved: float) -> None:
-    """Where moments prove the condition for far asperities, it holds at each of them; and rates are
-    above their bounds for random stiffnesses."""
+def test_swept_rates_of_many(seed: int, moved: float) -> None:
+    """Rates are above their bounds for random stiffnesses, and where all are the largest."""
     random = np.random.default_rng(seed)
-    points = (cr.Asperities.hexagonal, cr.Asperities.square)[seed % 2](
-        spacing=1.0, tip_radius=1.0, within=11.0
-    ).positions
-    points = points + moved * random.normal(size=points.shape)
-    influence = DenseInfluence.assemble(points, 1.0)
+    lattice = (cr.Asperities.hexagonal, cr.Asperities.square)[seed % 2]
+    points = lattice(spacing=1.0, tip_radius=1.0, within=11.0).positions
+    influence = DenseInfluence.assemble(points + moved * random.normal(size=points.shape), 1.0)
     n, matrix = len(points), influence.matrix
     c = influence.separations() * random.uniform(0.05, 0.3, n) * (random.random(n) > 0.1)
-    support = np.flatnonzero(c)
-    swept = sweeping._Swept(influence, support, c)
-    near = swept.neighbours(support, 12)
-    weights = swept.weights(sweeping.around, False, support, near)
-    last = swept.neighbours(support, 108)[:, -1]
-    gains = swept.gains(support, near, weights, last)
-    proved = np.flatnonzero(gains)
-    assert len(proved) > 0.5 * n
-    for k in proved[::7]:
-        i = support[k]
-        far = support[matrix[i, support] <= matrix[i, last[k]]]
-        far = far[far != i]
-        swept_potential = weights[k] @ swept.potentials(near[k][:, None], far)
-        assert (swept_potential >= (1 + gains[k]) * matrix[i, far]).all()
     bounds = swept_rates(influence, c, 1.0 - matrix @ c, np.zeros(n))
-    assert (bounds[support] > 0).all()
-    for _ in range(3):
-        y = np.linalg.solve(np.eye(n) + matrix * (c * random.random(n)), np.ones(n))
+    assert (bounds[c > 0] > 0).all()
+    for share in (1.0, *random.random((5, n))):
+        y = np.linalg.solve(np.eye(n) + matrix * (c * share), np.ones(n))
         assert (y >= bounds).all()
 
 

@@ -32,12 +32,8 @@ def swung(amplitudes: Any = SWING, load: float = P, **options: Any) -> cr.Shaked
 
 BAD = [
     (lambda: cr.shear(CONTACT, force=1.01 * LIMIT), r"1\.01 f P: gross sliding"),
-    (lambda: cr.shear(CONTACT, force=-1.01 * LIMIT), r"1\.01 f P: gross sliding"),
     (lambda: cr.shear(CONTACT, force=float("nan")), "found nan, expected a finite number"),
     (lambda: cr.shear(CONTACT, force=[1e-8, 2e-8]), "force"),
-    (lambda: cr.shear(CONTACT, force="a"), "force"),
-    (lambda: cr.shear(CONTACT, force=None), "force"),
-    (lambda: cr.shear(CONTACT, force=1 + 1j), "force"),
     (lambda: cr.shear(CONTACT, displacement=1.01 * LAST), "displacement"),
     (lambda: cr.shear(CONTACT, displacement=np.nan), "displacement"),
     (lambda: cr.shear(LIFTED, force=1e-9), "at most f P = 0"),
@@ -51,12 +47,8 @@ BAD = [
     (lambda: cr.history(CONTACT, forces=[0.0, -2 * LIMIT]), r"forces\[1\].*gross sliding"),
     # Vector friction.
     (lambda: cr.shear_vector(CONTACT, force=1.01 * LIMIT), r"found .*\(1\.01 f P: gross sliding\)"),
-    (lambda: cr.shear_vector(CONTACT, force=-1.01 * LIMIT), r"found .*\(1\.01 f P: gross slid"),
     (lambda: cr.shear_vector(CONTACT, force=(LIMIT, 0.2 * LIMIT)), r"\(1\.0\d+ f P: gross slid"),
-    (lambda: cr.shear_vector(CONTACT, force=float("nan")), "force"),
     (lambda: cr.shear_vector(CONTACT, force=(0.0, float("inf"))), "force"),
-    (lambda: cr.shear_vector(CONTACT, force="much"), "force"),
-    (lambda: cr.shear_vector(CONTACT, force=None), "force"),
     (lambda: cr.shear_vector(BARE, force=1e-9), "coefficient of friction"),
     # Load paths.
     (lambda: follow([P, P], [0.0, 0.6 * P]), r"forces\[1\].*1\.2 f P: gross sliding"),
@@ -76,7 +68,6 @@ BAD = [
     (lambda: swung([np.nan, 1.0]), r"force_amplitudes\[0\].*finite"),
     (lambda: swung(load_amplitudes=[1e-9, 0, 0]), "load_amplitudes: found 3 values, expected 2, o"),
     (lambda: swung([["a", 0.0]], kind="vector"), "force_amplitudes"),
-    (lambda: swung([[np.inf, 0.0]], kind="vector"), "force_amplitudes"),
     (lambda: swung(np.zeros((0, 2)), kind="vector"), "force_amplitudes"),
     (lambda: swung(kind="plastic"), "kind"),
     (lambda: swung(load_amplitudes=[0.1 * P] * 2, kind="elastic"), r"load_amplitudes.*not .exact."),

@@ -179,10 +179,7 @@ def test_summits_on_filled_pixels_are_counted(find: Any, surface: cr.surface.Sur
         (("bare.npy", "--pixel", "one"), "--pixel: found 'one', expected a number, or two"),
         (("bare.npy", "--pixel", "-1"), "pixel: found -1.0, expected a positive number"),
         (("bare.npy", "--pixel", "1", "--fit", "99"), "found 40 by 30 pixels, expected at"),
-        (("bare.npy", "--pixel", "1", "--fit", "4"), "fit: found 4, expected an odd number"),
         (("bare.npy", "--pixel", "1", "--prune", "5"), "prune: found 5.0, expected a number"),
-        (("plane.npy", "--pixel", "1", "--out", "no/a"), "heights: found nothing but a plane"),
-        (("holes.npy", "--pixel", "1"), "found 3 holes (nan) in 1,200 pixels"),
         (("plane.npy", "--pixel", "1"), "heights: found nothing but a plane"),
         (("scan.npz", "--radius", "1"), "--radius needs exactly one of --approach and --load"),
         (("scan.npz", "--load", "1"), "--approach, --load and --modulus need --radius"),
@@ -262,10 +259,8 @@ def test_where_nothing_touches_nothing_is_to_be_trusted(find: Any) -> None:
     ("curvatures", "degrees", "radii", "more"),
     [
         ((1 / 3e3, 0.0), 0.0, (2307.7, 1e4), ""),
-        ((1 / 3e3, 0.0), 90.0, (1e4, 2307.7), ""),
         ((1 / 3e3, 1 / 6e3), 30.0, (2307.7, 3750.0), "turn x and y of the summits by -[23]"),
         ((1 / 3e3, -1 / 3e3), 0.0, (2307.7, -4285.7), "accepts no negative radius, but inf for a"),
-        ((-1 / 3e3, -1 / 3e3), 0.0, (-4285.7, -4285.7), "no hill with the removed form"),
     ],
 )
 def test_the_body_with_a_removed_paraboloid(
