@@ -49,15 +49,6 @@ def slips(state: ShearState) -> Array:
     return frozen(slips)
 
 
-def scatter(state: ShearState) -> float:
-    """Standard deviation of u at the adhered asperities, divided by the size of its mean.
-
-    In theory this is 0. The result is nan if no asperity adheres, or if all u are 0.
-    """
-    u = displacements(state)[state.stick_radii > 0]
-    return float(u.std() / abs(u.mean())) if u.any() else float("nan")
-
-
 def energies(state: ShearState) -> Array:
     """(n,) [force length] energy lost at each asperity per steady cycle between Q and -Q.
 

@@ -1,6 +1,7 @@
 """What downstream tests call: it must pass what is right, and say what is wrong."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ import pytest
 from scenes import PAPER_APPROACH, paper, twins
 
 import convexrough as cr
-from convexrough.testing import assert_agree, assert_certified
+from convexrough.testing import assert_agree, assert_certified, assert_shear_certified
 
 PAGE = Path(__file__).parent.parent / "docs" / "how-to" / "test-your-solver.md"
 
@@ -59,6 +60,19 @@ def test_loads_not_certified_as_closely_as_asked(contact: cr.Contact) -> None:
     assert error is not None
     assert 1e-6 < float(error[1]) < 1e-3
     assert first_named(message, "load error") == 5  # the guilty one
+
+
+def test_shear_forces() -> None:
+    pressed = cr.press(replace(paper(), friction=0.5), approach=PAPER_APPROACH)
+    force = 0.25 * pressed.load
+    state = cr.shear(pressed, force=force)
+    certificate = assert_shear_certified(pressed, state.forces, force=force, within=1e-10)
+    assert list(certificate.status) == list(state.status)
+    slides = np.where(np.arange(61) == 4, 0.5 * pressed.loads, state.forces)  # it does not
+    message = failure(assert_shear_certified, pressed, slides, force=force)
+    assert first_named(message, "  claimed to slide, proved not to: 1") == 4
+    message = failure(assert_shear_certified, pressed, state.forces, force=force * 1.02)
+    assert "the total force is not the prescribed one" in message.splitlines()[0]
 
 
 def test_nothing_to_prove() -> None:

@@ -5,13 +5,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from figure_checks import fits, texts
 from matplotlib.figure import Figure
 from scenes import PAPER_APPROACH, paper
 
-import convexrough as cr
 from convexrough import plots
 from convexrough.compare import compare
 from convexrough.plots.style import quantity
@@ -34,15 +32,6 @@ def test_quantities_are_written_one_way(value: float, unit: str, said: str) -> N
     assert quantity(value, unit) == said
 
 
-def scattered(load: float = 2.0) -> cr.Contact:
-    random = np.random.default_rng(4)
-    points = random.uniform(-0.12, 0.12, (90, 2))
-    asperities = cr.Asperities(points, random.uniform(0.02, 0.06, 90), random.normal(0, 2e-4, 90))
-    material = cr.Material.from_youngs(210e3, 0.3)
-    scene = cr.Scene(10.0, asperities, material, friction=0.4, units=("mm", "N"))
-    return cr.press(scene, load=load)
-
-
 def test_files_keep_their_text_and_pixels(tmp_path: Path) -> None:
     figure = Figure(figsize=(1, 1))
     figure.subplots().set_xlabel("load [mN]")
@@ -56,16 +45,6 @@ def test_files_keep_their_text_and_pixels(tmp_path: Path) -> None:
     before = text
     plots.save(figure, tmp_path / "a.svg", "svg")
     assert (tmp_path / "a.svg").read_text(encoding="utf-8") == before  # no date inside
-
-
-def test_fretting_and_gradients_are_drawn_with_units() -> None:
-    contact = scattered()
-    cycle = cr.cycle(contact, maximum=0.2 * contact.load)
-    fits(plots.gradient_figures(cycle.gradient(), of="D_0")["gradient"])
-    figure = plots.fretting_figures(cr.fretting(cycle))["fretting"]
-    fits(figure)
-    said = " ".join(text.get_text() for text in texts(figure))
-    assert all(unit in said for unit in ("nm]", "nJ]", "GPa]")), said
 
 
 @pytest.mark.parametrize("seconds", [(1e-4, 2e-4, 5e-4), (0.95, 1.05), (1e-4, 10.0), (0.1,)])
