@@ -50,9 +50,7 @@ def results(geometry: Literal["summit", "closest"]) -> Iterator[Any]:
 
 
 @pytest.mark.parametrize("geometry", ["summit", "closest"])
-def test_results_do_not_depend_on_the_order_of_candidates(
-    monkeypatch: pytest.MonkeyPatch, geometry: Literal["summit", "closest"]
-) -> None:
+def test_results_do_not_depend_on_the_order_of_candidates(monkeypatch: Any, geometry: Any) -> None:
     usual = list(results(geometry))
     monkeypatch.setattr(layout, "MANY", 0)  # as on large lattices, whose points have another order
     other = list(results(geometry))

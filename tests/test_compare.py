@@ -285,9 +285,7 @@ class Needs:
 """
 
 
-def test_a_solver_of_ones_own_by_its_name(
-    command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_solver_of_ones_own_by_its_name(command: Any, tmp_path: Path, monkeypatch: Any) -> None:
     monkeypatch.setattr(sys, "path", sys.path[:])
     broken = {"unlicensed": "raise RuntimeError('no licence')", "broken": "def ("}
     for module, text in {"desk_solvers": MINE, **broken}.items():

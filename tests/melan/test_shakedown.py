@@ -260,9 +260,7 @@ def test_enclosures_hold_the_limit_in_ball_arithmetic(
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("lie", ["nothing", "noise", "doubled", "backwards"])
-def test_a_solver_that_lies_does_not_move_the_limit(
-    lie: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_solver_that_lies_does_not_move_the_limit(lie: str, monkeypatch: Any) -> None:
     """The bounds get worse, and stay true; or the answer is refused."""
     swing = np.array([[0.0, 1.0], [0.3, -0.8], [-0.6, 0.1]]) * RADIUS
     honest = melan.run_clarabel

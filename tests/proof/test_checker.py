@@ -104,9 +104,7 @@ def test_it_runs_alone(document: Any, tmp_path: Path) -> None:
         (b" " * (checker.MOST_BYTES + 1), "more than"),
     ],
 )
-def test_unreadable(
-    contents: bytes, reason: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_unreadable(contents: bytes, reason: str, tmp_path: Path, capsys: Any) -> None:
     path = tmp_path / "proof.json"
     path.write_bytes(contents)
     assert checker.main([str(path)]) == 2

@@ -44,9 +44,7 @@ reference = LOAD
 """
 
 
-def test_nothing_is_proved_where_order_fails(
-    run: Any, command: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_nothing_is_proved_where_order_fails(run: Any, command: Any, monkeypatch: Any) -> None:
     """A small low asperity between five crowded ones loses load as the load rises."""
     for name in ("SETTLED", "SETTLED_MOTION"):
         monkeypatch.setattr(general_step, name, np.inf)
