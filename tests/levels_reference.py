@@ -15,7 +15,7 @@ from flint import arb, ctx
 from friction_scenes import FRICTION, with_friction
 from gradient_oracle import DIGITS, Balls, Oracle, Setup, exact
 from multiprecision import cube_root, slide, travel_of
-from scenes import MATERIAL, NAMED
+from scenes import NAMED, hexagonal
 
 import convexrough as cr
 from convexrough.arrays import Array
@@ -24,19 +24,7 @@ Holding = Literal["load", "approach"]
 
 #: name -> (scene, approach), with friction; "dense" has the crowding 0.88.
 SCENES = {name: (with_friction(scene), approach) for name, (scene, approach) in NAMED.items()}
-SCENES["dense"] = (
-    with_friction(
-        cr.Scene(
-            1.0,
-            cr.Asperities.hexagonal(
-                spacing=0.0025, tip_radius=0.07, within=0.0102, height_std=1e-6, seed=3
-            ),
-            MATERIAL,
-            geometry="summit",
-        )
-    ),
-    5e-5,
-)
+SCENES["dense"] = (with_friction(hexagonal(tip_radius=0.07, height_std=1e-6, seed=3)), 5e-5)
 
 
 class Level(Oracle):

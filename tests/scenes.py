@@ -49,16 +49,9 @@ def paper(geometry: Any = "summit") -> cr.Scene:
 
 def rough(geometry: Any = "summit") -> cr.Scene:
     """91 asperities with random heights and tip radii."""
-    asperities = cr.Asperities.hexagonal(
-        spacing=0.0025,
-        tip_radius=0.02,
-        within=0.0126,
-        height_std=1e-6,
-        tip_radius_cv=0.1,
-        seed=7,
-    )
-    assert len(asperities) == 91
-    return cr.Scene(1.0, asperities, MATERIAL, geometry=geometry)
+    scene = hexagonal(within=0.0126, height_std=1e-6, tip_radius_cv=0.1, seed=7)
+    assert len(scene) == 91
+    return replace(scene, geometry=geometry)
 
 
 def steel(geometry: Any = "summit") -> cr.Scene:

@@ -109,6 +109,13 @@ def wrong(call: str) -> Any:
             r"sliding: found shape \(1,\) of int64, expected",
         ),
         ("cr.testing.assert_certified(scene, -1.0, approach=5e-5)", r"loads\[0\]: found -1"),
+        ("contact.plot('load')", "axes: found type str, expected Axes"),
+        ("contact.columns('loads', 'load')", "columns: found 'load', expected some of stat"),
+        ("cr.testing.assert_agree(contact, cr.shear(contact, force=0))", "type ShearState, exp"),
+        (
+            "(p := cr.program(scene, load=1e-7)).loads(p.data.linear * np.nan)",
+            r"values\[0\]: found nan",
+        ),
     ],
 )
 def test_wrong_types_are_said(call: str, said: str) -> None:

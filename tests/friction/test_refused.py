@@ -30,6 +30,11 @@ def swung(amplitudes: Any = SWING, load: float = P, **options: Any) -> cr.Shaked
     return cr.shakedown(PAPER, load=load, force_amplitudes=amplitudes, **options)
 
 
+def around_in_phase(amplitude: Any) -> cr.PhaseLosses:
+    given = dict(load_amplitude=amplitude, force_amplitude=0.1 * P, phases=[0.0])
+    return cr.phase_losses(PAPER, load=P, **given)
+
+
 BAD = [
     (lambda: cr.shear(CONTACT, force=1.01 * LIMIT), r"1\.01 f P: gross sliding"),
     (lambda: cr.shear(CONTACT, force=float("nan")), "found nan, expected a finite number"),
@@ -74,6 +79,10 @@ BAD = [
     (lambda: swung(force=P), "force:"),
     (lambda: swung(kind="vector"), "shape"),
     (lambda: swung(load=-P), "load:"),
+    (lambda: swung(np.ma.masked_less(SWING, 0)), "force_amplitudes: found 1 masked"),
+    (lambda: swung(load_amplitudes=np.ma.masked_less(SWING, 0)), "load_amplitudes: found 1 mas"),
+    (lambda: around_in_phase("1e-8"), "load_amplitude"),
+    (lambda: around_in_phase([1e-8]), "load_amplitude"),
     # Derivatives.
     (lambda: LIFTED.gradient(load=1.0), "a contact with a load"),
     (

@@ -9,7 +9,7 @@ from flint import arb, ctx
 from friction_scenes import FRICTION, with_friction
 from gradient_oracle import DIGITS, STEP, Setup, assert_close, exact, known
 from levels_reference import SCENES, Holding, of_setup, pressed
-from scenes import paper
+from scenes import hexagonal, paper
 
 import convexrough as cr
 
@@ -122,10 +122,7 @@ def test_gross_sliding_from_one_side() -> None:
 
 
 def test_many_asperities_by_every_operator() -> None:
-    asperities = cr.Asperities.hexagonal(
-        spacing=2.5e-4, tip_radius=2e-3, within=2.5e-3, height_std=3e-8, seed=1
-    )
-    scene = with_friction(cr.Scene(1.0, asperities, cr.Material(1.0, 0.3), geometry="summit"))
+    scene = with_friction(hexagonal(2.5e-4, 2e-3, 2.5e-3, height_std=3e-8, seed=1))
     found = {}
     for kind in ("dense", "lattice", "scattered"):
         contact = cr.press(scene, load=1e-8, influence=kind)  # type: ignore[arg-type]

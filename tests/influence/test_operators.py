@@ -24,6 +24,7 @@ from convexrough.normal.certificate import certify_on
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.refine import trial
 from convexrough.roundoff import ROUNDOFF
+from convexrough.scene.lattice import Lattice
 from convexrough.solvers import Newton
 
 Array = NDArray[np.float64]
@@ -129,6 +130,34 @@ def test_parts_and_other_points(kind: str, layout: str, seed: int, count: int) -
         for power in (2, 3):
             exactly, _ = inverse_sums(points, part.points, loads, power=power)
             assert (coupling.falloff(loads, power) >= exactly).all()
+
+
+@pytest.mark.sample(3)
+@pytest.mark.parametrize(
+    ("kind", "layout"), [c for c in CASES if c[0] == "lattice" or c[1] in EVEN]
+)
+@pytest.mark.parametrize("seed", range(2))
+def test_slopes(kind: str, layout: str, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    A = operator(kind, layout, rng)
+    loads, rows = rng.uniform(0.5, 1.0, len(A)), rng.integers(0, len(A), 100)
+    apart = A.points[rows, None] - A.points
+    pulls = SCALE * inverse_distances(A.points[rows], A.points) ** 3 * loads
+    true = -(pulls[..., None] * apart).sum(axis=1)
+    sizes = (pulls[..., None] * np.abs(apart)).sum(axis=1)
+    assert (np.abs(A.slopes(loads)[rows] - true) <= 1e-10 * sizes.max(axis=1)[:, None]).all()
+
+
+@pytest.mark.parametrize("name", BASES)
+def test_what_is_nearly_a_lattice_is_none(name: str) -> None:
+    points = lattice_patch(np.array(BASES[name]), 500)
+    assert Lattice.through(points) is not None
+    noise = 1e-9 * np.random.default_rng(2).standard_normal(points.shape)
+    for moved in (slice(None), 0, 100, 499):
+        jittered = points.copy()
+        jittered[moved] += noise[moved]
+        assert Lattice.through(jittered) is None
+    assert Lattice.through(np.concatenate((points, points[77:78]))) is None
 
 
 @pytest.mark.sample(20)

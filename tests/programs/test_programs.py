@@ -8,19 +8,14 @@ import highspy
 import numpy as np
 import pytest
 import scs
-from scenes import PAPER_APPROACH
+from scenes import PAPER_APPROACH, hexagonal
 from scipy import sparse
 
 import convexrough as cr
 from convexrough.programs import program
 
 #: The source paper's, its inner 19 asperities.
-SCENE = cr.Scene(
-    1.0,
-    cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0051),
-    cr.Material(contact_modulus=1.0, poisson_ratio=0.3),
-    geometry="summit",
-)
+SCENE = hexagonal(within=0.0051)
 CONTACT = cr.press(SCENE, approach=PAPER_APPROACH)
 CONTROLS: dict[str, dict[str, float]] = {
     "approach": {"approach": PAPER_APPROACH},

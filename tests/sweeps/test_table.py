@@ -2,13 +2,14 @@
 
 import logging
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from scene_files import scene_text
-from scenes import MATERIAL, paper
+from scenes import MATERIAL, hexagonal, paper
 from sweep_files import SMALL, numbers, same, sweeping, swept, tables, toml
 
 import convexrough as cr
@@ -54,11 +55,8 @@ def test_rows_are_those_of_single_scenes() -> None:
     assert set(rows["status"]) == {"certified"}
     assert set(rows["message"]) == {""}
     for i in (0, 7):  # the first and the last seed
-        asperities = cr.Asperities.hexagonal(
-            spacing=0.0025, tip_radius=0.02, within=0.0102,
-            height_std=rows["asperities.height_std"][i], seed=int(rows["seed"][i]),
-        )  # fmt: skip
-        scene = cr.Scene(1.0, asperities, MATERIAL, 0.5, geometry="summit")
+        rough = hexagonal(height_std=rows["asperities.height_std"][i], seed=int(rows["seed"][i]))
+        scene = replace(rough, friction=0.5)
         contact = cr.press(scene, load=rows["normal.load"][i])
         P, proof = 0.5 * contact.load, contact.certificate
         first, second = cr.cycles(contact, P * np.array([0.37, 0.5]), P * np.array([-0.37, 0.1]))

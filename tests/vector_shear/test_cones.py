@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from friction_scenes import FRICTION, VECTOR_FRACTIONS, found, lengths, pressed
+from friction_scenes import FRICTION, VECTOR_FRACTIONS, found, lengths, pressed, with_friction
 from numpy.testing import assert_allclose
-from scenes import PAPER_APPROACH
+from scenes import PAPER_APPROACH, hexagonal
 
 import convexrough as cr
 from convexrough import FrictionConic, shear_vector
@@ -40,8 +40,7 @@ def test_cones_and_newton_agree(nu: float, fraction: float) -> None:
 
 @cache
 def blunt(tip_radius: float) -> cr.Contact:
-    lattice = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=tip_radius, within=0.0102)
-    scene = cr.Scene(1.0, lattice, cr.Material(1.0, 0.5), FRICTION, geometry="summit")
+    scene = with_friction(hexagonal(tip_radius=tip_radius), nu=0.5)
     return cr.press(scene, approach=PAPER_APPROACH)
 
 
