@@ -257,11 +257,6 @@ class Spurious(Mine):
     def changed(self, loads):
         return np.where(loads > 0, loads, 1e-4 * loads.max())
 
-class Exit(Mine):
-    name = "exit"
-    def changed(self, loads):
-        raise SystemExit(0)
-
 class Ones:  # the loads of a solver are judged as they are
     name = "newton"
     refine = {}
@@ -303,8 +298,6 @@ def test_a_solver_of_ones_own_by_its_name(command: Any, tmp_path: Path, monkeypa
     assert spurious.status == 0  # the loads are right to 1e-4, the claimed contacts are not
     assert "spurious: 24 contacts differ from those of newton" in spurious.err
     assert "same; 24 contacts differ" in spurious.out
-    left = command("compare", "scene.toml", "--solver", "desk_solvers.Exit")
-    assert (left.status, "exit: failed" in left.err) == (4, True)
     for name, said in (
         ("desk_solvers.Yours", "no attribute 'Yours'"),
         ("no_module.Mine", "No module named 'no_module'"),

@@ -17,6 +17,9 @@ import sys
 import convexrough as cr
 heavy = {"numpy", "scipy", "cvxpy", "clarabel", "osqp", "matplotlib", "pydantic", "click", "rich"}
 assert not heavy & {*sys.modules}
+from convexrough import cli
+cli.main(["--help"])
+assert not {"pydantic", "matplotlib", "rich", "cvxpy", "scipy.linalg"} & {*sys.modules}
 cr.testing.assert_certified, cr.compare.compare
 scene = cr.Scene(1.0, cr.Asperities([[0.0, 0.0]], 1.0), cr.Material(1.0, 0.3))
 repr(cr.press(scene, approach=1e-4))

@@ -57,11 +57,3 @@ def test_summits_of_a_map_stay_with_it(tmp_path: Path) -> None:
     with pytest.raises(cr.InputError, match="units: found summits in µm, expected"):
         cr.Scene(1e4, named, MATERIAL, units=("mm", "N"))
     assert len(cr.Scene(1e4, named, MATERIAL, units=("um", "N"))) == len(named)
-
-
-def test_maps_of_the_wrong_kind() -> None:
-    heights = np.random.default_rng(0).normal(size=(20, 20))
-    wrong = {"unit": None, "filled_pixels": np.zeros((20, 20)), "pixel": np.ones((3, 2))}
-    for name, value in wrong.items():
-        with pytest.raises(cr.InputError, match=f"^{name}: found"):
-            cr.surface.Surface(heights, **{"pixel": 1.0, name: value})

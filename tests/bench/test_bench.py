@@ -1,7 +1,6 @@
 """The benchmark: its reference, and what it writes. No time is tested."""
 
 import json
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -86,10 +85,3 @@ def test_page(command: Any, tmp_path: Path) -> None:
     names = {path.name for path in (tmp_path / "figures").iterdir()}
     assert names == {"work-precision.png", "cost.png"}
     assert not (tmp_path / "bench-results/cost.png").exists()
-
-
-def test_solvers_without_known_errors_are_not_compared() -> None:
-    rows = tuple(replace(row, error=np.nan) for row in tiny().rows)
-    said = "\n".join(replace(tiny(), rows=rows).verdicts())
-    assert "the default solver is not compared, because no reference loads" in said
-    assert "frontier" not in said

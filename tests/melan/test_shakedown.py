@@ -5,13 +5,16 @@ from fractions import Fraction
 from itertools import product
 from typing import Any
 
+import multiprecision
 import numpy as np
 import pytest
-from flint import arb, arb_mat
+from flint import arb
+from multiprecision import solve_linear
 from numpy.testing import assert_allclose
 from path_scenes import LARGEST, PAPER, SCENES, shaded
 from scenes import solve_exactly, twins
 from scipy.sparse import csc_matrix, vstack
+from vector_oracle import tangential_kernel
 
 import convexrough as cr
 from convexrough.arrays import Array
@@ -205,38 +208,19 @@ def exact_shares(
     scene: cr.Scene, load: float, vector: bool, along: int
 ) -> tuple[list[arb], list[list[arb]]]:
     """P_i and the forces Y_i under a unit force along x or y, in balls, without the package."""
-    loads = solve_exactly(scene, load=load).loads
-    touching = [i for i, each in enumerate(loads) if each > 0]
-    points = [[arb(float(x)) for x in scene.asperities.positions[i]] for i in touching]
-    nu, size = arb(scene.material.poisson_ratio), 2 if vector else 1
-    n = len(touching)
-    stiffness = arb_mat(size * n, size * n)
-    for a, i in enumerate(touching):
-        R = 1 / (1 / arb(scene.sphere_radius) + 1 / arb(float(scene.asperities.tip_radii[i])))
-        radius = (loads[i] * R * 3 / 4).root(3)
-        for c in range(size):
-            stiffness[size * a + c, size * a + c] = 1 / (2 * radius)
-        for b in range(n):
-            if a == b:
-                continue
-            d = [x - y for x, y in zip(points[a], points[b], strict=True)]
-            r = (d[0] * d[0] + d[1] * d[1]).sqrt()
-            if not vector:
-                stiffness[a, b] = 1 / (arb.pi() * r)
-                continue
-            for c in range(2):
-                for e in range(2):
-                    tensor = (1 - nu if c == e else arb(0)) + nu * d[c] * d[e] / r**2
-                    stiffness[2 * a + c, 2 * b + e] = 2 * tensor / ((2 - nu) * arb.pi() * r)
-    together = arb_mat(size * n, size)
-    for a in range(n):
-        for c in range(size):
-            together[size * a + c, c] = arb(1)
-    moved = stiffness.solve(together)
-    shares = moved * (together.transpose() * moved).inv()
-    return [loads[i] for i in touching], [
-        [shares[size * a + c, along] for c in range(size)] for a in range(n)
-    ]
+    exact, size = solve_exactly(scene, load=load).loads, 2 if vector else 1
+    touching = [i for i, each in enumerate(exact) if each > 0]
+    P, nu = np.array([exact[i] for i in touching]), arb(scene.material.poisson_ratio)
+    points, _, law = (each[touching] for each in multiprecision.of_scene(scene))
+    stiffness = multiprecision.coupling(points, arb(scene.material.contact_modulus))
+    if vector:
+        stiffness = tangential_kernel(points, stiffness, nu / (2 - nu))
+    own = np.repeat(2 * law / (3 * multiprecision.cube_root(P)), size)
+    stiffness[np.diag_indices(len(own))] = own
+    together = multiprecision.exact(np.tile(np.eye(size), (len(P), 1)))
+    moved = np.column_stack([solve_linear(stiffness, each) for each in together.T])
+    share = solve_linear(together.T @ moved, multiprecision.exact(np.eye(size)[along]))
+    return list(P), (moved @ share).reshape(-1, size).tolist()
 
 
 @pytest.mark.sample(3)

@@ -1,19 +1,13 @@
 """Quantities with units, and files as journals want them."""
 
 import re
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
-from figure_checks import fits, texts
 from matplotlib.figure import Figure
-from scenes import PAPER_APPROACH, paper
 
 from convexrough import plots
-from convexrough.compare import compare
 from convexrough.plots.style import quantity
-from convexrough.solvers import Newton
 
 
 @pytest.mark.parametrize(
@@ -45,16 +39,3 @@ def test_files_keep_their_text_and_pixels(tmp_path: Path) -> None:
     before = text
     plots.save(figure, tmp_path / "a.svg", "svg")
     assert (tmp_path / "a.svg").read_text(encoding="utf-8") == before  # no date inside
-
-
-@pytest.mark.parametrize("seconds", [(1e-4, 2e-4, 5e-4), (0.95, 1.05), (1e-4, 10.0), (0.1,)])
-def test_the_axis_of_times(seconds: tuple[float, ...]) -> None:
-    found = compare(paper(), approach=PAPER_APPROACH, solvers=[Newton()])
-    (entry,) = found.entries
-    assert entry.contact
-    timed = [replace(entry.contact, seconds=each) for each in seconds]
-    named = [replace(entry, solver=f"a solver of long name {i}") for i in range(len(seconds))]
-    entries = [replace(one, contact=each) for one, each in zip(named, timed, strict=True)]
-    figure: Any = replace(found, entries=tuple(entries)).plot().figure
-    fits(figure)
-    assert len({text.get_text() for text in texts(figure) if "10^" in text.get_text()}) > 1

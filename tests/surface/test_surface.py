@@ -70,8 +70,12 @@ def test_another_unit_is_the_same_surface() -> None:
 def test_no_map(heights: object, message: str) -> None:
     with pytest.raises(cr.InputError, match=message):
         cr.surface.Surface(heights, 1.0)  # type: ignore[arg-type]
-    with pytest.raises(cr.InputError, match="unit: found 'parsec', expected a unit of length"):
-        cr.surface.Surface(NOISE, 1.0, "parsec")
+    wrong = {"unit": "parsec", "filled_pixels": np.zeros((20, 20)), "pixel": np.ones((3, 2))}
+    for name, value in wrong.items():
+        with pytest.raises(cr.InputError, match=f"^{name}: found"):
+            cr.surface.Surface(NOISE, **{"pixel": 1.0, name: value})
+    with pytest.raises(cr.InputError, match=r"^unit: found None"):
+        cr.surface.Surface(NOISE, 1.0, None)  # type: ignore[arg-type]
 
 
 def test_a_paraboloid_of_a_turned_cylinder() -> None:

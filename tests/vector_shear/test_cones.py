@@ -14,7 +14,6 @@ import convexrough as cr
 from convexrough import FrictionConic, shear_vector
 from convexrough.solvers.programs import RawAnswer
 from convexrough.vector_shear import cones
-from convexrough.vector_shear.problem import FrictionProblem
 
 
 @pytest.mark.sample(3)
@@ -42,18 +41,6 @@ def test_cones_and_newton_agree(nu: float, fraction: float) -> None:
 def blunt(tip_radius: float) -> cr.Contact:
     scene = with_friction(hexagonal(tip_radius=tip_radius), nu=0.5)
     return cr.press(scene, approach=PAPER_APPROACH)
-
-
-@pytest.mark.sample(3)
-@pytest.mark.parametrize("fraction", [1e-6, 0.2, 0.5, 0.9])
-@pytest.mark.parametrize("tip_radius", [0.3, 0.5])
-def test_five_cones(tip_radius: float, fraction: float) -> None:
-    contact = blunt(tip_radius)
-    assert 21 / 25 < contact.cached(FrictionProblem).share < 1
-    force = fraction * FRICTION * contact.load
-    newton = shear_vector(contact, force=force)
-    conic = shear_vector(contact, force=force, solver=FrictionConic())
-    assert lengths(newton.forces - conic.forces).max() < 1e-6 * lengths(newton.forces).max()
 
 
 def test_too_dense_for_a_convex_program() -> None:
