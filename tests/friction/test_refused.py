@@ -45,10 +45,8 @@ BAD = [
     (lambda: cr.shear(BARE, force=1e-9), "coefficient of friction"),
     (lambda: cr.cycle(BARE, maximum=0.0), "coefficient of friction"),
     (lambda: cr.cycle(CONTACT, maximum=1.1 * LIMIT), r"maximum\[0\].*gross sliding"),
-    (
-        lambda: cr.cycle(CONTACT, maximum=0.1 * LIMIT, minimum=0.2 * LIMIT),
-        r"maximum\[0\].*at least the minimum",
-    ),
+    (lambda: cr.cycle(CONTACT, maximum=0.1 * LIMIT, minimum=0.2 * LIMIT),
+     r"maximum\[0\].*at least the minimum"),
     (lambda: cr.history(CONTACT, forces=[0.0, -2 * LIMIT]), r"forces\[1\].*gross sliding"),
     # Vector friction.
     (lambda: cr.shear_vector(CONTACT, force=1.01 * LIMIT), r"found .*\(1\.01 f P: gross sliding\)"),
@@ -60,10 +58,8 @@ BAD = [
     (lambda: follow([P, -P], [0.0, 0.0]), r"loads\[1\].*not negative"),
     (lambda: follow([P, 0.0], [0.0, 1e-9 * P]), r"forces\[1\].*before contact is lost"),
     (lambda: follow([], []), "at least one"),
-    (
-        lambda: follow([P], [0.0], start=cr.press(replace(PAPER, friction=0.4), load=P)),
-        "another scene",
-    ),
+    (lambda: follow([P], [0.0], start=cr.press(replace(PAPER, friction=0.4), load=P)),
+     "another scene"),
     (lambda: follow([P], [0.0], general_steps=0), "steps"),
     (lambda: follow([P, 1e-300 * P], [0.0, 0.0]), "largest"),
     (lambda: follow([1e-300 * P], [0.0], start=cr.press(PAPER, load=P)), "largest"),
@@ -85,24 +81,16 @@ BAD = [
     (lambda: around_in_phase([1e-8]), "load_amplitude"),
     # Derivatives.
     (lambda: LIFTED.gradient(load=1.0), "a contact with a load"),
-    (
-        lambda: cr.history(CONTACT, forces=[LIMIT]).gradient(losses=[1.0]),
-        "in gross sliding a history has no derivative",
-    ),
+    (lambda: cr.history(CONTACT, forces=[LIMIT]).gradient(losses=[1.0]),
+     "in gross sliding a history has no derivative"),
     (lambda: CONTACT.gradient(loads=[1.0, 2.0]), "61 values, one per asperity"),
-    (
-        lambda: cr.cycle(CONTACT, maximum=LIMIT).gradient(holding="approach"),
-        "at constant approach f P may fall below",
-    ),
-    (
-        lambda: cr.cycle(TOGETHER, maximum=FRICTION * TOGETHER.load).gradient(),
-        "several asperities slide last",
-    ),
-    (
-        lambda: cr.onset_gradient(TOGETHER, 1),
-        "asperity: found 1, which slides last, together with",
-    ),
-]
+    (lambda: cr.cycle(CONTACT, maximum=LIMIT).gradient(holding="approach"),
+     "at constant approach f P may fall below"),
+    (lambda: cr.cycle(TOGETHER, maximum=FRICTION * TOGETHER.load).gradient(),
+     "several asperities slide last"),
+    (lambda: cr.onset_gradient(TOGETHER, 1),
+     "asperity: found 1, which slides last, together with"),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("call", "message"), BAD)
