@@ -66,10 +66,7 @@ class Trial(NamedTuple):
 
 
 def trial(seed: int, durations: dict[str, float], finished: dict[str, dict[str, bytes]]) -> Trial:
-    """The one of this number, in a folder of its own.
-
-    durations : [s] of each command undisturbed;  finished : what each writes
-    """
+    """The one of this number, in a folder of its own."""
     rng = random.Random(seed)
     name = _command(seed)
     fault = FAULTS[seed // len(COMMANDS) % len(FAULTS)]

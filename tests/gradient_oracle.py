@@ -123,10 +123,7 @@ def known(gradient: cr.Gradient, name: str) -> tuple[Array, Array]:
 def assert_slopes(
     judge: Judge, gradient: cr.Gradient, *, seed: int = 0, sharp: float = 0.0
 ) -> None:
-    """Every derivative within its bound of differences, arrays along random signs.
-
-    sharp : what no bound may exceed of the largest derivative of its kind; 0 for any
-    """
+    """Every derivative within its bound of differences, arrays along random signs."""
     rng = np.random.default_rng(seed)
     names = ["heights", "tip_radii", "positions", "sphere_radius", "contact_modulus"]
     names += ["poisson_ratio"] + ["friction"] * (gradient.friction is not None)

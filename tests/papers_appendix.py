@@ -5,11 +5,7 @@ is the sum of [A3] and [A4] over all asperities. The mean of u over the asperiti
 ("adhered") approximates the displacement of distant points. The slip of a sliding asperity is this
 mean minus its u.
 
-In theory u is the same at all adhered asperities. The computed values differ slightly, for two
-reasons. [A3] and [A4] spread each force over a disc, but `shear` uses point forces. If Poisson's
-ratio is not 0, displacements decay more slowly along the shear force than across it, but `shear`
-averages over directions. So the slips of the asperities in a ring differ, and some slips may be
-opposite to the shear force.
+docs/validation.md says where the method and `shear` differ, and why.
 
 Nothing here is certified. Displacements and energies are for both bodies, and so twice those of the
 paper.
@@ -36,10 +32,7 @@ def displacements(state: ShearState) -> Array:
 
 
 def slips(state: ShearState) -> Array:
-    """(n,) [length] slips of sliding asperities, 0 for others; positive along positive Q.
-
-    If all asperities slide, the largest displacement replaces the mean.
-    """
+    """(n,) [length] slips of sliding asperities, 0 for others; positive along positive Q."""
     u, adhered = displacements(state), state.stick_radii > 0
     sliding = (state.contact.loads > 0) & ~adhered
     slips = np.zeros(len(u))
@@ -50,12 +43,7 @@ def slips(state: ShearState) -> Array:
 
 
 def energies(state: ShearState) -> Array:
-    """(n,) [force length] energy lost at each asperity per steady cycle between Q and -Q.
-
-    The loss is W_i e(|Q_i| / (f P_i)) + 4 f P_i |s_i| with W_i = 9 (2 - nu) f^2 P_i^2 / (5 G a_i),
-    the function e of `mindlin.loss` and the slip s_i. If the slip is opposite to Q, the second term
-    is negative.
-    """
+    """(n,) [force length] energy lost at each asperity per steady cycle between Q and -Q."""
     contact, scene = state.contact, state.contact.scene
     friction = checks.friction(scene.friction)
     limits = friction * contact.loads

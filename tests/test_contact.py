@@ -20,6 +20,7 @@ from scenes import (
     random_cases,
     reference,
     rough,
+    scaled,
 )
 
 import convexrough as cr
@@ -119,15 +120,8 @@ def test_units_do_not_matter(sampled: Case, length: float, force: float) -> None
     """Lengths times lambda and moduli times mu: loads times lambda^2 mu, the same statuses."""
     scene, approach, kind = sampled
     lam, mu = 10**length, 10**force
-    a = scene.asperities
-    scaled = cr.Scene(
-        scene.sphere_radius * lam,
-        cr.Asperities(a.positions * lam, a.tip_radii * lam, a.heights * lam),
-        cr.Material(scene.material.contact_modulus * mu, 0.3),
-        geometry=scene.geometry,
-    )
     first = cr.press(scene, approach=approach)
-    second = cr.press(scaled, approach=approach * lam, influence=kind)
+    second = cr.press(scaled(scene, lam, mu), approach=approach * lam, influence=kind)
     top = first.loads.max()
     assert_allclose(second.loads / (lam**2 * mu), first.loads, rtol=1e-11, atol=1e-12 * top)
     sure = (first.status != "undecided") & (second.status != "undecided")

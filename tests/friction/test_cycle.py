@@ -9,11 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from levels_reference import Bristles
 from numpy.testing import assert_allclose
-from scenes import NAMED
+from scenes import NAMED, complementary_energy
 
 import convexrough as cr
-from convexrough.influence.coupling import inverse_distances
-from convexrough.sphere import hertz, mindlin
+from convexrough.sphere import mindlin
 
 NU = 0.3
 
@@ -34,15 +33,6 @@ def test_reference_losses_of_the_papers_example() -> None:
     below, above = cr.cycles(contact, np.array([0.387, 0.389]) * limit)
     assert below.loss_normalised < below.smooth_normalised
     assert above.loss_normalised > above.smooth_normalised
-
-
-def complementary_energy(contact: cr.Contact) -> float:
-    """V = sum (3/5) k P^(5/3) + P'AP / 2 - d'P, in the scene's own units."""
-    scene, P = contact.scene, contact.loads
-    k = hertz.local_coefficient(scene.material.contact_modulus, scene.relative_radii)
-    inverse = inverse_distances(scene.contact_points, scene.contact_points)
-    coupled = inverse @ P / (np.pi * scene.material.contact_modulus)
-    return float(0.6 * k @ P ** (5 / 3) + P @ coupled / 2 - scene.offsets @ P)
 
 
 @pytest.mark.sample(1)

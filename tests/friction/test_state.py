@@ -36,26 +36,6 @@ def test_eighty_digits(influence: str, name: str, fraction: float) -> None:
         assert cycle.balance_defect < 1e-10
 
 
-@pytest.mark.sample(1)
-@pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("influence", KINDS)
-def test_onsets_are_where_sliding_starts(influence: str, name: str) -> None:
-    contact = pressed(name, influence)
-    limit, every = FRICTION * contact.load, cr.onset_of_sliding(contact)
-    assert np.nanmax(every) == pytest.approx(limit, rel=1e-12)
-    assert np.isnan(every[contact.loads == 0]).all()
-    some = np.flatnonzero(contact.loads)[::7]
-    onsets = dict(zip(some, cr.onset_of_sliding(contact, which=some), strict=True))
-    for i in some:
-        if onsets[i] < 0.999 * limit:
-            before = cr.shear(contact, force=onsets[i] * (1 - 1e-9))
-            after = cr.shear(contact, force=onsets[i] * (1 + 1e-9))
-            assert before.slips[i] == 0
-            assert after.slips[i] > 0
-            # ... and nothing less would do: the slip is first order in the excess.
-            assert after.slips[i] < 1e-8 * after.displacement
-
-
 def test_zero_and_the_limit() -> None:
     contact = pressed("paper")
     limit = FRICTION * contact.load

@@ -10,7 +10,7 @@ import gallery_answers
 import numpy as np
 import pytest
 from gallery_answers import true_statuses
-from scenes import operators
+from scenes import operators, scaled
 
 import convexrough as cr
 from convexrough import gallery, solvers
@@ -137,14 +137,6 @@ def test_a_hundred_thousand_reversals(name: str, pytestconfig: pytest.Config) ->
     assert case.check_shear(past.asperity_forces[-1]).error < 1e-12
     assert within(past.displacements[-1], [case.displacement], past.displacement_errors[-1])
     assert (np.diff(past.losses) >= -1e-13 * past.losses[-1]).all()
-
-
-def scaled(scene: cr.Scene, length: float, modulus: float) -> cr.Scene:
-    a = scene.asperities
-    asperities = cr.Asperities(a.positions * length, a.tip_radii * length, a.heights * length)
-    material = cr.Material(scene.material.contact_modulus * modulus, scene.material.poisson_ratio)
-    radius = scene.sphere_radius * length
-    return cr.Scene(radius, asperities, material, scene.friction, scene.geometry)
 
 
 @pytest.mark.sample(3)

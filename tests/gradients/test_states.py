@@ -134,6 +134,7 @@ def test_onset(holding: Any) -> None:
         return ends[-1][0], ends[-1][0]
 
     judge = Judge(Setup.of(contact, holding), value)
+    assert onset == pytest.approx(float(judge.at), rel=1e-13)
     gradient = cr.onset_gradient(contact, asperity, holding=holding)
     assert gradient.value == pytest.approx(onset, rel=1e-13)
     assert_slopes(judge, gradient, sharp=1e-10)

@@ -2,7 +2,6 @@
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
@@ -26,17 +25,6 @@ def dense(spacing: float) -> cr.Contact:
     return cr.press(cr.Scene(1.0, asperities, MATERIAL, geometry="summit"), load=4.5e-7)
 
 
-def doubted(scope: Any, undecided: int) -> cr.Contact:
-    """The paper's contact with doubt cast on the last of its touching asperities."""
-    contact = cr.press(paper(), approach=PAPER_APPROACH)
-    codes = contact.certificate.codes.copy()
-    codes[37 - undecided : 37] = 0
-    if scope == "none":
-        codes[:] = 0
-    certificate = dataclasses.replace(contact.certificate, scope=scope, codes=codes)
-    return dataclasses.replace(contact, certificate=certificate)
-
-
 CASES: dict[str, Callable[[], cr.Contact]] = {
     "one": lambda: few((0, 0)),
     "three": lambda: few((0, 0), (3e-3, 0), (-1e-3, 2.5e-3)),
@@ -46,8 +34,6 @@ CASES: dict[str, Callable[[], cr.Contact]] = {
     "2200": lambda: dense(3e-4),
     "4000": lambda: dense(2.2e-4),
     "nothing": lambda: cr.press(paper(), approach=-1e-6),
-    "undecided": lambda: doubted("global", 6),
-    "not proved": lambda: doubted("none", 37),
 }
 
 

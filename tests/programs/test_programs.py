@@ -8,7 +8,7 @@ import highspy
 import numpy as np
 import pytest
 import scs
-from scenes import PAPER_APPROACH, hexagonal
+from scenes import PAPER_APPROACH, complementary_energy, hexagonal
 from scipy import sparse
 
 import convexrough as cr
@@ -29,13 +29,8 @@ FEW = 8
 
 def energy(control: str) -> float:
     """Phi, from its definition: docs/theory/convexity.md, (1)."""
-    scene, P = CONTACT.scene, CONTACT.loads
-    R, modulus = scene.relative_radii, scene.material.contact_modulus
-    local = 0.6 * (9 / (16 * modulus**2 * R)) ** (1 / 3) * P ** (5 / 3)
-    r = np.hypot(*(scene.asperities.positions[:, None] - scene.asperities.positions).T)
-    np.fill_diagonal(r, np.inf)
-    depth = scene.offsets + (PAPER_APPROACH if control == "approach" else 0.0)
-    return float(local.sum() + P @ (1 / (np.pi * modulus * r)) @ P / 2 - depth @ P)
+    depth = PAPER_APPROACH if control == "approach" else 0.0
+    return complementary_energy(CONTACT) - depth * CONTACT.loads.sum()
 
 
 def matrix(data: Any, name: str, shape: tuple[int, int]) -> Any:
