@@ -22,15 +22,9 @@ from convexrough.normal.problem import NormalProblem
 from convexrough.solvers import BristleQP, ConicCVXPY, Newton
 
 NAMES = [
-    "newton",
-    "conic + Newton step",
-    "conic",
-    "conic in CVXPY + Newton step",
-    "conic in CVXPY",
-    "conic in CVXPY (SCS) + Newton step",
-    "conic in CVXPY (QOCO) + Newton step",
-    "bristles + Newton step",
-    "bristles",
+    *("newton", "conic + Newton step", "conic", "conic in CVXPY + Newton step", "conic in CVXPY"),
+    *("conic in CVXPY (SCS) + Newton step", "conic in CVXPY (QOCO) + Newton step"),
+    *("bristles + Newton step", "bristles"),
 ]
 
 

@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from friction_scenes import FRACTIONS, FRICTION, KINDS, NAMES, off, pressed, with_friction
+from friction_scenes import FRACTIONS, FRICTION, KINDS, NAMES, off, pressed
 from levels_reference import reference as exact
 from numpy.testing import assert_allclose
-from scenes import MATERIAL
 
 import convexrough as cr
 
@@ -57,14 +56,3 @@ def test_zero_and_the_limit() -> None:
     forth = cr.shear(contact, force=0.3 * limit)
     assert (back.forces == -forth.forces).all()
     assert back.displacement == -forth.displacement
-
-
-def test_nothing_loaded() -> None:
-    scene = with_friction(
-        cr.Scene(1.0, cr.Asperities([[1e-3, 0], [2e-3, 0]], 0.01), MATERIAL, geometry="summit")
-    )
-    contact = cr.press(scene, approach=1e-7)
-    state = cr.shear(contact, force=0.0)
-    assert (state.forces == 0).all()
-    assert (state.status == "open").all()
-    assert cr.shear(contact, displacement=0.0).force == 0.0

@@ -6,13 +6,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from figure_checks import fits
-from matplotlib.patches import Ellipse
 from numpy.testing import assert_allclose
 from scenes import MATERIAL, PAPER_APPROACH, paper, rough, steel
 
 import convexrough as cr
 from convexrough import fields
-from convexrough.plots import press_figures, shear_figures
+from convexrough.plots import press_figures
 
 
 def few(*points: tuple[float, float]) -> cr.Contact:
@@ -64,18 +63,3 @@ def test_the_colours_and_the_profile_show_the_pressure() -> None:
     (smooth,) = profile.lines
     assert_allclose(np.hypot(*smooth.get_data()), 1, rtol=1e-12)
     assert chart.get_xlim() == profile.get_xlim()
-
-
-def test_an_ellipse_beside_the_contact() -> None:
-    asperities = paper().asperities
-    contact = cr.press(cr.Scene((1.0, 2.5), asperities, MATERIAL, 0.5, "summit"), load=3e-7)
-    limit = 0.5 * contact.load
-    states = [cr.shear(contact, force=share * limit) for share in (0.3, 0.6)]
-    figures = press_figures(contact) | shear_figures(states)
-    smooth = cr.smooth(contact.scene, load=contact.load)
-    assert isinstance(smooth, cr.SmoothEllipsoid)
-    axes = np.array(smooth.semi_axes) / smooth.contact_radius
-    (contour,) = figures["pressure"].axes[0].findobj(Ellipse)
-    assert_allclose([contour.width, contour.height], 2 * axes)
-    whole, stick = figures["stick_slip"].axes[1].findobj(Ellipse)
-    assert_allclose(stick.width / whole.width, np.cbrt(1 - 0.6))

@@ -226,18 +226,6 @@ def test_the_whole_map_beside_its_asperities(find: Any, surface: cr.surface.Surf
     assert "--whole needs --scene or --radius" in find("ball.npz", "--whole").err
 
 
-def test_a_tilt_that_leaves_no_summit_is_named(find: Any, surface: cr.surface.Surface) -> None:
-    tilted = surface.heights + np.arange(256)
-    np.savez("tilt.npz", heights=tilted, pixel=1.0, unit="µm")
-    refused = find("tilt.npz", "--detrend", "none")
-    assert refused.status == 2
-    assert "; a plane, slopes " in refused.err
-    assert "--detrend plane, removes it" in refused.err
-    for form in ("plane", "sphere"):
-        found = find("tilt.npz", "--detrend", form)
-        assert (found.status, "variance" in found.err) == (0, False)
-
-
 def test_a_map_in_micrometres_called_millimetres(find: Any, surface: cr.surface.Surface) -> None:
     """Its slopes are right; only the base shows the mistake."""
     np.save("map.npy", surface.heights)
