@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from attacks import ATTACKS, assert_honest, attack
-from friction_scenes import FRICTION, pressed
+from friction_scenes import FRICTION, lengths, pressed
 from scenes import NAMED, PAPER_APPROACH, paper, reference
 
 import convexrough as cr
@@ -120,6 +120,29 @@ def test_what_are_no_forces_is_an_error(field: str, value: float) -> None:
     contact = pressed("paper")
     with pytest.raises(cr.SolverError, match=r"liar: no .* were found"):
         shear_vector(contact, force=0.3 * FRICTION * contact.load, solver=VectorLiar(spoil))
+
+
+@pytest.mark.parametrize("field", ["increments", "slips", "displacement", "total"])
+@pytest.mark.sample(1)
+def test_wrong_forces_are_never_called_right(field: str) -> None:
+    contact = pressed("paper")
+    force = 0.5 * FRICTION * contact.load
+    truth = shear_vector(contact, force=force)
+    sliding = lengths(truth.slips) > 0
+
+    def spoil(state: Any, rng: np.random.Generator) -> Any:
+        values = getattr(state, field)
+        size = 10.0 ** rng.uniform(-14, 1)
+        return state._replace(**{field: values * (1 + size * rng.standard_normal(values.shape))})
+
+    for seed in range(12):
+        state = shear_vector(contact, force=force, solver=VectorLiar(spoil, seed))
+        proof, known = state.certificate, truth.certificate
+        off = lengths(state.forces - truth.forces)
+        assert (off <= proof.force_errors + known.force_errors).all()
+        assert (lengths(state.slips - truth.slips) <= proof.slip_errors + known.slip_errors).all()
+        assert not (state.status[~sliding] == "sliding").any()
+        assert not (state.status[sliding] == "partial").any()
 
 
 def test_a_solver_cannot_change_what_the_proof_uses() -> None:

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
-from path_scenes import shaded
 from scenes import MATERIAL, NAMED
 
 import convexrough as cr
@@ -101,19 +100,6 @@ def test_what_rows_do_not_prove_is_done_one_by_one(monkeypatch: pytest.MonkeyPat
         assert_array_equal(ends.status[k], ends[k].status)
     monkeypatch.setattr(rows, "MOST", 60)
     assert cr.press_many(scenes, approach=5e-5).alone.tolist() == [0, 1, 2]
-
-
-def test_cycles_of_rows_beside_one_that_is_not_proved() -> None:
-    loads = [0.01, 2.96]
-    contacts = cr.press_many([shaded()] * len(loads), load=loads)
-    assert contacts.alone.tolist() == [1]
-    assert_same(contacts, 1, cr.press(shaded(), load=2.96))
-    cycles = contacts.cycles(0.2 * contacts.loads)
-    for k in range(len(loads)):
-        one = cycles[k]
-        assert cycles.order[k] == one.order
-        assert cycles.losses[k] == one.loss
-        assert_array_equal(cycles.status[k], one.status)
 
 
 def test_warnings_of_many() -> None:

@@ -37,11 +37,8 @@ def test_the_octagon() -> None:
     assert found.asperity_losses.sum() == pytest.approx(found.loss, rel=1e-3, abs=0.0)
     statuses, counts = np.unique(found.status, return_counts=True)
     assert dict(zip(statuses.tolist(), counts.tolist(), strict=True)) == {
-        "intermittent": 6,
-        "open": 24,
-        "partial": 19,
-        "sliding": 12,
-    }
+        "intermittent": 6, "open": 24, "partial": 19, "sliding": 12,
+    }  # fmt: skip
     assert settled(octagon("rough")).loss == pytest.approx(1.9572569969746e-13, rel=1e-12, abs=0.0)
 
 
@@ -89,14 +86,9 @@ def test_losses_against_phase() -> None:
     scene, P = SCENES["paper"], 0.7 * LARGEST["paper"]
     p, t = 0.2 * P, 0.3 * P
     found = cr.phase_losses(
-        scene,
-        load=P,
-        load_amplitude=p,
-        force_amplitude=0.5 * t,
-        phases=[0.0, 0.7, np.pi / 2],
-        factors=[1.0, 0.5],
-        chords=12,
-    )
+        scene, load=P, load_amplitude=p, force_amplitude=0.5 * t, phases=[0.0, 0.7, np.pi / 2],
+        factors=[1.0, 0.5], chords=12,
+    )  # fmt: skip
     assert found.phases.tolist() == [0.0, 0.7, np.pi / 2] * 2
     assert found.factors.tolist() == [1.0] * 3 + [0.5] * 3
     loads, forces = cr.elliptic_path(

@@ -32,13 +32,9 @@ B, A = 19, 31
 def turned(angle: float, chords: int = 96) -> tuple[Array, Array]:
     """The amplitudes of an ellipse: 0.1 and 0.2 of the mean load, which is 0.9 of the largest."""
     return cr.elliptic_path(
-        load=0.0,
-        load_amplitude=0.09 * P,
-        force_amplitude=0.5 * 0.18 * P,
-        phase=np.radians(angle),
-        friction=0.5,
-        chords=chords,
-    )
+        load=0.0, load_amplitude=0.09 * P, force_amplitude=0.5 * 0.18 * P, phase=np.radians(angle),
+        friction=0.5, chords=chords,
+    )  # fmt: skip
 
 
 def swung(kind: str, size: float, along: int = 0) -> Array:

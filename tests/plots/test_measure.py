@@ -3,27 +3,9 @@
 import re
 from pathlib import Path
 
-import pytest
 from matplotlib.figure import Figure
 
 from convexrough import plots
-from convexrough.plots.style import quantity
-
-
-@pytest.mark.parametrize(
-    ("value", "unit", "said"),
-    [
-        (4.12e-3, "mm", "4.12 µm"),
-        (0.5, "N", "500 mN"),
-        (591.0, "N/mm²", "591 MPa"),
-        (4.82e-3, "N mm", "4.82 µJ"),
-        (0.0, "mm", "0 mm"),
-        (4.12e-5, "", r"$4.12\times 10^{-5}$"),
-        (12.0, "$", r"12 \$"),
-    ],
-)
-def test_quantities_are_written_one_way(value: float, unit: str, said: str) -> None:
-    assert quantity(value, unit) == said
 
 
 def test_files_keep_their_text_and_pixels(tmp_path: Path) -> None:

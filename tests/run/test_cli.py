@@ -177,13 +177,9 @@ SUMMITS = 'pattern = "file"\npath = "summits.csv"\ntip_radius = 0.02'
 
 def test_usage_errors(command: Any) -> None:
     for line in (
-        "run",
-        "run a.toml --outt x",
-        "walk",
-        "verify a.toml",
-        "run a b",
+        "run", "run a.toml --outt x", "walk", "verify a.toml", "run a b",
         "gallery few --profile --export new",
-    ):
+    ):  # fmt: skip
         outcome = command(*line.split())
         assert (outcome.status, outcome.out) == (2, ""), line
         assert "Usage: convexrough" in outcome.err

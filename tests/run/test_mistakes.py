@@ -128,13 +128,9 @@ def refused(folder: Path, text: str) -> list[str]:
 def test_all_mistakes_are_told_at_once(tmp_path: Path) -> None:
     text = "r = 1\n[sphere]\nradius = -1\n[material]\npoisson_ratio = 0.6\n[normal]\n"
     assert [line.split(":")[0] for line in refused(tmp_path, text)] == [
-        "r",
-        "[sphere] radius",
-        "[material] poisson_ratio",
-        "[material] contact_modulus, youngs_modulus",
-        "[normal] approach, load",
-        "[asperities]",
-    ]
+        "r", "[sphere] radius", "[material] poisson_ratio",
+        "[material] contact_modulus, youngs_modulus", "[normal] approach, load", "[asperities]",
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize(

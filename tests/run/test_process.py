@@ -33,14 +33,6 @@ def test_exit_status_of_a_process(tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["good-results", "good.toml"]
 
 
-def test_a_line_is_completed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setenv("_CONVEXROUGH_COMPLETE", "bash_complete")
-    monkeypatch.setenv("COMP_WORDS", "convexrough run --pr")
-    monkeypatch.setenv("COMP_CWORD", "2")
-    done = module(cwd=tmp_path)
-    assert (done.returncode, done.stdout.split(), done.stderr) == (0, ["plain,--proof"], "")
-
-
 def test_an_interrupt_while_an_object_is_freed(tmp_path: Path) -> None:
     """Python ignores errors of `__del__`, so this interrupt would be lost."""
     code = (

@@ -66,25 +66,20 @@ def test_rows_are_those_of_single_scenes() -> None:
         closed = cr.steady(scene, loads=loads, forces=forces)
         expected = {
             "contact": (contact.status == "contact").sum(),
-            "open": (contact.status == "open").sum(),
-            "undecided": 0,
-            "load": contact.load,
-            "approach": contact.approach,
-            "load_error": proof.load_error,
+            "open": (contact.status == "open").sum(), "undecided": 0, "load": contact.load,
+            "approach": contact.approach, "load_error": proof.load_error,
             "certificate.convexity_number": proof.convexity_number,
-            "model_error": contact.model_error,
-            "crowding": contact.crowding,
+            "model_error": contact.model_error, "crowding": contact.crowding,
             "displacement_0.2": cr.shear(contact, force=0.2 * P).displacement,
             "displacement_0.5": cr.shear(contact, force=0.5 * P).displacement,
-            "loss_0.37": first.loss,
-            "loss_0.1_0.5": second.loss,
+            "loss_0.37": first.loss, "loss_0.1_0.5": second.loss,
             "loss_normalised_0.37": first.loss_normalised,
             "loss_over_smooth_0.1_0.5": second.loss_normalised / second.smooth_normalised,
             "loss_factor_0.37": first.loss_factor,
             "secant_stiffness_0.1_0.5": second.secant_stiffness,
             "history.loss_2": cr.history(contact, forces=P * np.array([0.5, -0.2, 0.5])).losses[2],
             "steady.loss": closed.loss,
-        }
+        }  # fmt: skip
         for name, value in expected.items():
             rounding = 1e-12 * value if name == "load_error" else 0.0
             assert rows[name][i] == pytest.approx(value, rel=0.0, abs=rounding), name
