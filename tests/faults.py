@@ -2,8 +2,7 @@
 
     PYTHONPATH=tests python tests/faults.py $(seq 0 299)    trials by number; prints those that fall
 
-Each trial is a process, forked from one that has imported everything, so that it starts at once and
-a moment drawn at random is one of its work. A limit on the size of files stands for a full disk.
+Each trial is a process forked from one that has imported everything.
 """
 
 import contextlib

@@ -1,8 +1,6 @@
 """Contacts in 130 digits, for differences of them: the test oracle.
 
-Written from the formulas of physics alone, in the scene's own units, and sharing no code with the
-package: Hertz's law k P^(2/3) and Boussinesq's coupling. Who touches is taken from a state in
-float64 and must not change within a step. `levels_reference` makes friction of such contacts.
+By the formulas of physics alone; those that touch are taken from float64 and may not change.
 """
 
 from collections.abc import Callable

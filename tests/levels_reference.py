@@ -1,9 +1,6 @@
 """Normal solutions at any load in 100 digits and all that friction makes of them: the reference.
 
-At a total load L: loads P_i, approach D0, gaps, energy V = sum (3/5) k P^(5/3) + P'AP/2 - d'P. Of
-two such levels, P above and L = P - Q/f, `multiprecision.slide` makes friction states where every
-indentation grows with the load. Where one does not, `Bristles` follows the load in steps and
-remembers. Nothing of the package is used but float64 loads to begin Newton at.
+Two levels make friction states by `multiprecision.slide`; where order fails `Bristles` follow.
 """
 
 from dataclasses import replace

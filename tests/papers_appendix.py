@@ -1,14 +1,7 @@
 """Slips and losses by the appendix of Dini and Hills (2009), equations [A1] to [A15].
 
-Forces and stick discs are those of `shear`. The surface displacement u at the centre of an asperity
-is the sum of [A3] and [A4] over all asperities. The mean of u over the asperities that do not slide
-("adhered") approximates the displacement of distant points. The slip of a sliding asperity is this
-mean minus its u.
-
-docs/validation.md says where the method and `shear` differ, and why.
-
-Nothing here is certified. Displacements and energies are for both bodies, and so twice those of the
-paper.
+Forces and stick discs are those of `shear`; docs/validation.md says how the methods differ.
+Displacements and energies are for both bodies, and so twice those of the paper.
 """
 
 from __future__ import annotations

@@ -2,9 +2,7 @@
 
     PYTHONPATH=tests python tests/status_audit.py 3000        prints what docs/tests.md says
 
-Each scene is drawn from a seed of its own, pressed through one operator under one control, sheared,
-cycled and sheared with vectors, and all that is said of it is compared with proved 60-digit states:
-in exact arithmetic, so that a bound too small by a roundoff is found too.
+Comparisons are in exact arithmetic, so that a bound too small by a roundoff is found too.
 """
 
 import sys

@@ -69,3 +69,15 @@ def test_what_a_killed_process_left_is_removed_by_the_next(tmp_path: Path, comma
         path.write_text("mine")
     remove_unfinished(folder)
     assert all(path.exists() for path in kept)
+
+
+@forks
+def test_new_on_a_full_disk_leaves_nothing(tmp_path: Path) -> None:
+    limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100)); "
+    code = limit + "from convexrough.cli import main; raise SystemExit(main(['new', 'a.toml']))"
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2
+    assert done.stderr == "convexrough: error: a.toml: cannot be written: File too large\n"
+    assert list(tmp_path.iterdir()) == []

@@ -160,13 +160,10 @@ def test_the_only_sheet_with_a_map(tmp_path: Path) -> None:
             raw(path, [sheet, (HEIGHTS > 0).tolist()], pixel=1.0)
         with pytest.raises(cr.InputError, match="comments: found Pixel 0"):
             raw(path, [sheet, [["Pixel", 0.5]]], pixel=1.0)
+    titled = [["Surface map"], [], *HEIGHTS.tolist()]
+    assert_allclose(raw(path, [titled], pixel=1.0).heights, HEIGHTS)
     with pytest.raises(cr.FileError, match=f"found no map {both}"):
         raw(path, [INFORMATION, INFORMATION], pixel=1.0)
-
-
-def test_text_above_the_map_in_a_sheet(tmp_path: Path) -> None:
-    titled = [["Surface map"], [], *HEIGHTS.tolist()]
-    assert_allclose(raw(tmp_path / "a.xlsx", [titled], pixel=1.0).heights, HEIGHTS)
 
 
 HOLED = np.where(X == Y, np.nan, HEIGHTS)
