@@ -261,11 +261,6 @@ class Ones:  # the loads of a solver are judged as they are
 class Refined(Ones):
     refine = {"refine": True}
 
-class Short(Mine):
-    name = "short"
-    def solve(self, problem, start=None):
-        return Solution.of(problem, np.ones(3), 1.0, 1)
-
 class NoSolver: ...
 class NoName:
     def solve(self, problem, start=None): ...
@@ -305,8 +300,6 @@ def test_a_solver_of_ones_own_by_its_name(command: Any, tmp_path: Path, monkeypa
         wrong = command("compare", "scene.toml", "--solver", name)
         assert (wrong.status, wrong.out) == (2, "")
         assert re.search(said, wrong.err)
-    short = command("compare", "scene.toml", "--solver", "desk_solvers.Short")
-    assert "loads of shape (3,), expected (" in short.out
     profiled = command("gallery", "--profile", "few", "--solver", "desk_solvers.Mine", "--json")
     assert [each["solver"] for each in json.loads(profiled.out)["profile"]] == ["newton", "mine"]
     mine = json.loads(profiled.out)["profile"][1]

@@ -31,6 +31,8 @@ def scattered(count: int) -> list[cr.Scene]:
     return [cr.Scene(1.0, cr.Asperities(each, 0.02), MATERIAL, F) for each in places]
 
 
+BASES: list[Any] = [1.0, 2.0, (1.0, 1.5)]
+
 #: What differs from scene to scene -> (scenes, approaches).
 SETS = {
     "heights": (rough(6), 5e-5),
@@ -38,13 +40,7 @@ SETS = {
     "tips": (rough(4, tips=0.1), 5e-5),
     "places by tips": (rough(3, tips=0.1, geometry="closest"), 5e-5),
     "places": (scattered(4), 5e-5),
-    "bases": (
-        [
-            replace(each, sphere_radius=radius)
-            for each, radius in zip(rough(3), [1.0, 2.0, (1.0, 1.5)], strict=True)
-        ],
-        5e-5,
-    ),
+    "bases": ([replace(rough(3)[k], sphere_radius=R) for k, R in enumerate(BASES)], 5e-5),
     "frictions": ([replace(each, friction=0.1 * k + 0.2) for k, each in enumerate(rough(3))], 5e-5),
     "one": (rough(1), 5e-5),
 }

@@ -1,7 +1,5 @@
 """Summits as asperities, and the generator whose spectrum is known."""
 
-import pickle
-
 import numpy as np
 from numpy.testing import assert_allclose
 
@@ -31,10 +29,6 @@ def test_summits_are_asperities_that_know_their_map() -> None:
     frame = summits.to_dataframe()
     np.testing.assert_array_equal(frame["tip_radius"], summits.tip_radii)
     assert frame.attrs == {"unit": ""}
-    again = pickle.loads(pickle.dumps(summits))
-    np.testing.assert_array_equal(again.positions, summits.positions)
-    assert again.origin.moments == origin.moments
-    assert not again.prominences.flags.writeable
 
 
 def test_the_map_has_the_moments_of_its_spectrum() -> None:
