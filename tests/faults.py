@@ -2,8 +2,7 @@
 
     PYTHONPATH=tests python tests/faults.py $(seq 0 299)    trials by number; prints those that fall
 
-Each trial is a process, forked from one that has imported everything, so that it starts at once and
-a moment drawn at random is one of its work. A limit on the size of files stands for a full disk.
+Each trial is a process forked from one that has imported everything.
 """
 
 import contextlib
@@ -66,10 +65,7 @@ class Trial(NamedTuple):
 
 
 def trial(seed: int, durations: dict[str, float], finished: dict[str, dict[str, bytes]]) -> Trial:
-    """The one of this number, in a folder of its own.
-
-    durations : [s] of each command undisturbed;  finished : what each writes
-    """
+    """The one of this number, in a folder of its own."""
     rng = random.Random(seed)
     name = _command(seed)
     fault = FAULTS[seed // len(COMMANDS) % len(FAULTS)]

@@ -2,9 +2,7 @@
 
     PYTHONPATH=tests python tests/fuzz.py 0 3000        mutants by number; prints those that fall
 
-Scenes, summits, loads, shear forces and proofs are spoiled, each as a number says. One process runs
-many, under limits of its own: processor time and memory for each, address space for all. A warning
-counts as a traceback.
+One process runs many, under limits of its own. A warning counts as a traceback.
 """
 
 import contextlib

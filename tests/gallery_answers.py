@@ -5,8 +5,7 @@
 
 A new case is a line without "answer".
 
-Every digit is proved by an interval Newton step (`multiprecision`). Friction is Ciavarella and
-Jaeger's theorem, Q_i = f (P_i - p_i(P - Q / f)), of two such states.
+Every digit is proved by an interval Newton step (`multiprecision`).
 """
 
 import json

@@ -1,8 +1,6 @@
 """Contacts in 130 digits, for differences of them: the test oracle.
 
-Written from the formulas of physics alone, in the scene's own units, and sharing no code with the
-package: Hertz's law k P^(2/3) and Boussinesq's coupling. Who touches is taken from a state in
-float64 and must not change within a step. `levels_reference` makes friction of such contacts.
+By the formulas of physics alone; those that touch are taken from float64 and may not change.
 """
 
 from collections.abc import Callable
@@ -123,10 +121,7 @@ def known(gradient: cr.Gradient, name: str) -> tuple[Array, Array]:
 def assert_slopes(
     judge: Judge, gradient: cr.Gradient, *, seed: int = 0, sharp: float = 0.0
 ) -> None:
-    """Every derivative within its bound of differences, arrays along random signs.
-
-    sharp : what no bound may exceed of the largest derivative of its kind; 0 for any
-    """
+    """Every derivative within its bound of differences, arrays along random signs."""
     rng = np.random.default_rng(seed)
     names = ["heights", "tip_radii", "positions", "sphere_radius", "contact_modulus"]
     names += ["poisson_ratio"] + ["friction"] * (gradient.friction is not None)

@@ -1,9 +1,6 @@
 """Normal solutions at any load in 100 digits and all that friction makes of them: the reference.
 
-At a total load L: loads P_i, approach D0, gaps, energy V = sum (3/5) k P^(5/3) + P'AP/2 - d'P. Of
-two such levels, P above and L = P - Q/f, `multiprecision.slide` makes friction states where every
-indentation grows with the load. Where one does not, `Bristles` follows the load in steps and
-remembers. Nothing of the package is used but float64 loads to begin Newton at.
+Two levels make friction states by `multiprecision.slide`; where order fails `Bristles` follow.
 """
 
 from dataclasses import replace
@@ -15,7 +12,7 @@ from flint import arb, ctx
 from friction_scenes import FRICTION, with_friction
 from gradient_oracle import DIGITS, Balls, Oracle, Setup, exact
 from multiprecision import cube_root, slide, travel_of
-from scenes import MATERIAL, NAMED
+from scenes import NAMED, hexagonal
 
 import convexrough as cr
 from convexrough.arrays import Array
@@ -24,19 +21,7 @@ Holding = Literal["load", "approach"]
 
 #: name -> (scene, approach), with friction; "dense" has the crowding 0.88.
 SCENES = {name: (with_friction(scene), approach) for name, (scene, approach) in NAMED.items()}
-SCENES["dense"] = (
-    with_friction(
-        cr.Scene(
-            1.0,
-            cr.Asperities.hexagonal(
-                spacing=0.0025, tip_radius=0.07, within=0.0102, height_std=1e-6, seed=3
-            ),
-            MATERIAL,
-            geometry="summit",
-        )
-    ),
-    5e-5,
-)
+SCENES["dense"] = (with_friction(hexagonal(tip_radius=0.07, height_std=1e-6, seed=3)), 5e-5)
 
 
 class Level(Oracle):

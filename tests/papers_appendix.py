@@ -1,18 +1,7 @@
 """Slips and losses by the appendix of Dini and Hills (2009), equations [A1] to [A15].
 
-Forces and stick discs are those of `shear`. The surface displacement u at the centre of an asperity
-is the sum of [A3] and [A4] over all asperities. The mean of u over the asperities that do not slide
-("adhered") approximates the displacement of distant points. The slip of a sliding asperity is this
-mean minus its u.
-
-In theory u is the same at all adhered asperities. The computed values differ slightly, for two
-reasons. [A3] and [A4] spread each force over a disc, but `shear` uses point forces. If Poisson's
-ratio is not 0, displacements decay more slowly along the shear force than across it, but `shear`
-averages over directions. So the slips of the asperities in a ring differ, and some slips may be
-opposite to the shear force.
-
-Nothing here is certified. Displacements and energies are for both bodies, and so twice those of the
-paper.
+Forces and stick discs are those of `shear`; docs/validation.md says how the methods differ.
+Displacements and energies are for both bodies, and so twice those of the paper.
 """
 
 from __future__ import annotations
@@ -36,10 +25,7 @@ def displacements(state: ShearState) -> Array:
 
 
 def slips(state: ShearState) -> Array:
-    """(n,) [length] slips of sliding asperities, 0 for others; positive along positive Q.
-
-    If all asperities slide, the largest displacement replaces the mean.
-    """
+    """(n,) [length] slips of sliding asperities, 0 for others; positive along positive Q."""
     u, adhered = displacements(state), state.stick_radii > 0
     sliding = (state.contact.loads > 0) & ~adhered
     slips = np.zeros(len(u))
@@ -49,22 +35,8 @@ def slips(state: ShearState) -> Array:
     return frozen(slips)
 
 
-def scatter(state: ShearState) -> float:
-    """Standard deviation of u at the adhered asperities, divided by the size of its mean.
-
-    In theory this is 0. The result is nan if no asperity adheres, or if all u are 0.
-    """
-    u = displacements(state)[state.stick_radii > 0]
-    return float(u.std() / abs(u.mean())) if u.any() else float("nan")
-
-
 def energies(state: ShearState) -> Array:
-    """(n,) [force length] energy lost at each asperity per steady cycle between Q and -Q.
-
-    The loss is W_i e(|Q_i| / (f P_i)) + 4 f P_i |s_i| with W_i = 9 (2 - nu) f^2 P_i^2 / (5 G a_i),
-    the function e of `mindlin.loss` and the slip s_i. If the slip is opposite to Q, the second term
-    is negative.
-    """
+    """(n,) [force length] energy lost at each asperity per steady cycle between Q and -Q."""
     contact, scene = state.contact, state.contact.scene
     friction = checks.friction(scene.friction)
     limits = friction * contact.loads

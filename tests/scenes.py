@@ -49,16 +49,9 @@ def paper(geometry: Any = "summit") -> cr.Scene:
 
 def rough(geometry: Any = "summit") -> cr.Scene:
     """91 asperities with random heights and tip radii."""
-    asperities = cr.Asperities.hexagonal(
-        spacing=0.0025,
-        tip_radius=0.02,
-        within=0.0126,
-        height_std=1e-6,
-        tip_radius_cv=0.1,
-        seed=7,
-    )
-    assert len(asperities) == 91
-    return cr.Scene(1.0, asperities, MATERIAL, geometry=geometry)
+    scene = hexagonal(within=0.0126, height_std=1e-6, tip_radius_cv=0.1, seed=7)
+    assert len(scene) == 91
+    return replace(scene, geometry=geometry)
 
 
 def steel(geometry: Any = "summit") -> cr.Scene:
@@ -78,6 +71,24 @@ def twins() -> tuple[cr.Scene, float]:
 def prescribed(scene: cr.Scene, approach: float, control: str) -> dict[str, float]:
     """How to prescribe the contact at this approach: by the approach, or by its load."""
     return {control: getattr(cr.press(scene, approach=approach), control)}
+
+
+def complementary_energy(contact: cr.Contact) -> float:
+    """V = sum (3/5) k P^(5/3) + P'AP / 2 - d'P, from docs/theory/convexity.md, (1)."""
+    scene, P, E = contact.scene, contact.loads, contact.scene.material.contact_modulus
+    k = np.cbrt(9 / (16 * E**2 * scene.relative_radii))
+    apart = np.hypot(*np.moveaxis(scene.contact_points[:, None] - scene.contact_points, -1, 0))
+    np.fill_diagonal(apart, np.inf)
+    return float(0.6 * k @ P ** (5 / 3) + P @ (1 / (np.pi * E * apart)) @ P / 2 - scene.offsets @ P)
+
+
+def scaled(scene: cr.Scene, length: float, modulus: float) -> cr.Scene:
+    """In other units: lengths times `length`, moduli times `modulus`."""
+    a, material = scene.asperities, scene.material
+    asperities = cr.Asperities(a.positions * length, a.tip_radii * length, a.heights * length)
+    material = cr.Material(material.contact_modulus * modulus, material.poisson_ratio)
+    radius = scene.sphere_radius * length
+    return cr.Scene(radius, asperities, material, scene.friction, scene.geometry)
 
 
 #: name -> (scene, approach): every one in the convex range.
@@ -118,11 +129,7 @@ def reference(scene: cr.Scene, **control: float) -> multiprecision.Reference:
 
 
 def scattered(seed: int, count: int, crowding: float, roughness: float) -> tuple[cr.Scene, float]:
-    """A random scene and an approach.
-
-    crowding  : about the convexity number it will have (well below 1 is easy, above is hard)
-    roughness : standard deviation of heights over the approach
-    """
+    """A random scene and an approach."""
     rng = np.random.default_rng(seed)
     separation = 0.6 / np.sqrt(count)
     points = [np.zeros(2)]

@@ -2,9 +2,7 @@
 
     PYTHONPATH=tests python tests/status_audit.py 3000        prints what docs/tests.md says
 
-Each scene is drawn from a seed of its own, pressed through one operator under one control, sheared,
-cycled and sheared with vectors, and all that is said of it is compared with proved 60-digit states:
-in exact arithmetic, so that a bound too small by a roundoff is found too.
+Comparisons are in exact arithmetic, so that a bound too small by a roundoff is found too.
 """
 
 import sys
@@ -16,7 +14,7 @@ import multiprecision
 import numpy as np
 from flint import arb, ctx
 from multiprecision import Friction, slide, travel_of
-from scenes import on_lattice, operators, scattered, solve_exactly
+from scenes import on_lattice, operators, scaled, scattered, solve_exactly
 from vector_oracle import solve_vectors
 
 import convexrough as cr
@@ -102,10 +100,7 @@ def draw(seed: int) -> tuple[str, cr.Scene, float]:
         scene = replace(scene, asperities=cr.Asperities(points, radii, np.append(a.heights, 0.0)))
     if kind == "units":
         length, modulus = 10.0 ** rng.uniform(-40, 40), 10.0 ** rng.uniform(-40, 40)
-        a = scene.asperities
-        asperities = cr.Asperities(a.positions * length, a.tip_radii * length, a.heights * length)
-        material = cr.Material(modulus, 0.3)
-        scene = cr.Scene(scene.sphere_radius * length, asperities, material, None, scene.geometry)
+        scene = scaled(scene, length, modulus / scene.material.contact_modulus)
         approach *= length
     return kind, replace(scene, friction=FRICTION), approach
 
@@ -178,11 +173,7 @@ def audit_pressed(
 
 
 def _slid(contact: cr.Contact, full: Any, force: Any) -> Friction | None:
-    """The exact state of first loading.
-
-    None beyond the limit of the true loads, where all slide and how far is not determined. Raises
-    Dragged where an asperity is, which the theorem is not for.
-    """
+    """The exact state of first loading."""
     left = full.load - arb(force) / arb(FRICTION)
     if not left > 0:
         return None

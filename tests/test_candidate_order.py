@@ -1,12 +1,13 @@
 """Results do not depend on the order in which a problem holds the asperities."""
 
 from collections.abc import Iterator
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any, Literal
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scenes import hexagonal
 
 import convexrough as cr
 from convexrough.contact import levels_of
@@ -15,11 +16,7 @@ from convexrough.scene import layout
 
 def results(geometry: Literal["summit", "closest"]) -> Iterator[Any]:
     """One result of each kind, of an array of which all asperities could touch."""
-    asperities = cr.Asperities.hexagonal(
-        spacing=0.0025, tip_radius=0.02, within=0.0102, height_std=2e-7, seed=1
-    )
-    material = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
-    scene = cr.Scene(1.0, asperities, material, friction=0.5, geometry=geometry)
+    scene = replace(hexagonal(height_std=2e-7, seed=1), friction=0.5, geometry=geometry)
     contact = cr.press(scene, approach=5.5e-5)
     load, force, n = contact.load, 0.2 * contact.load, len(scene)
     weights = np.arange(n) - 0.4 * n
@@ -50,9 +47,7 @@ def results(geometry: Literal["summit", "closest"]) -> Iterator[Any]:
 
 
 @pytest.mark.parametrize("geometry", ["summit", "closest"])
-def test_results_do_not_depend_on_the_order_of_candidates(
-    monkeypatch: pytest.MonkeyPatch, geometry: Literal["summit", "closest"]
-) -> None:
+def test_results_do_not_depend_on_the_order_of_candidates(monkeypatch: Any, geometry: Any) -> None:
     usual = list(results(geometry))
     monkeypatch.setattr(layout, "MANY", 0)  # as on large lattices, whose points have another order
     other = list(results(geometry))

@@ -12,15 +12,10 @@ from matplotlib.text import Text
 FOLDER = Path(__file__).parent.parent / "examples"
 #: Relative tolerances: of the paper's rounded numbers, of quadrature, extrapolation and minima.
 TOLERANCES = {
-    "papers_example": 1e-3,
-    "losing_contact": 1e-5,
-    "continuum_limit": 1e-5,
-    "limits_of_shakedown": 1e-7,
-    "normal_and_shear_together": 5e-5,
-    "roughness_statistics": 1e-3,
-    "design_a_damper": 1e-3,
-    "scatter_of_heights": 0.1,
-}
+    "papers_example": 1e-3, "losing_contact": 1e-5, "continuum_limit": 1e-5,
+    "limits_of_shakedown": 1e-7, "normal_and_shear_together": 5e-5, "roughness_statistics": 1e-3,
+    "design_a_damper": 1e-3, "scatter_of_heights": 0.1,
+}  # fmt: skip
 
 
 #: All `compare()` at their end.

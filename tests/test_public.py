@@ -17,6 +17,9 @@ import sys
 import convexrough as cr
 heavy = {"numpy", "scipy", "cvxpy", "clarabel", "osqp", "matplotlib", "pydantic", "click", "rich"}
 assert not heavy & {*sys.modules}
+from convexrough import cli
+cli.main(["--help"])
+assert not {"pydantic", "matplotlib", "rich", "cvxpy", "scipy.linalg"} & {*sys.modules}
 cr.testing.assert_certified, cr.compare.compare
 scene = cr.Scene(1.0, cr.Asperities([[0.0, 0.0]], 1.0), cr.Material(1.0, 0.3))
 repr(cr.press(scene, approach=1e-4))
@@ -52,10 +55,8 @@ def wrong(call: str) -> Any:
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (
-            "cr.press(scene.asperities, approach=5e-5)",
-            "scene: found type Asperities, expected a Scene",
-        ),
+        ("cr.press(scene.asperities, approach=5e-5)",
+         "scene: found type Asperities, expected a Scene"),
         ("cr.press(cr.Scene, approach=5e-5)", "scene: found the class Scene, expected a Scene"),
         ("cr.press(scene, approach='5e-5')", "approach: found '5e-5', expected a finite number"),
         ("cr.press(scene, approach=5e-5, solver=cr.solvers.Newton)", "found the class Newton"),
@@ -78,14 +79,10 @@ def wrong(call: str) -> Any:
         ("cr.press_many(scene, load=1.0)", "scenes: found type Scene, expected a list of scenes"),
         ("cr.read_scene(5)", "path: found 5, expected the name of a scene file"),
         ("contact.proof(sheared=[1e-8])", r"sheared\[0\]: found 1e-08, expected a shear state"),
-        (
-            "contact.proof(sheared=[cr.shear(contact, force=0)])",
-            r"sheared\[0\].*force 0, expected one",
-        ),
-        (
-            "contact.proof(sheared=[cr.shear(cr.press(scene, load=1e-7), force=0)])",
-            "another contact",
-        ),
+        ("contact.proof(sheared=[cr.shear(contact, force=0)])",
+         r"sheared\[0\].*force 0, expected one"),
+        ("contact.proof(sheared=[cr.shear(cr.press(scene, load=1e-7), force=0)])",
+         "another contact"),
         ("cr.solvers.Newton(max_iterations=1.5)", "max_iterations: found 1.5, expected a whole"),
         ("cr.solvers.Newton(tolerance=-1.0)", "tolerance: found -1.0, expected a number that is"),
         ("cr.solvers.Conic(max_iterations=-3)", "max_iterations: found -3, expected a whole"),
@@ -100,17 +97,18 @@ def wrong(call: str) -> Any:
         ("cr.testing.assert_agree(contact, contact.loads)", "scene: found none"),
         ("cr.testing.assert_agree(contact, OTHER)", "second: found 1, expected as many"),
         ("cr.testing.assert_agree(contact, contact, within=5)", "within: found 5, expected a frac"),
-        (
-            "cr.testing.assert_agree(contact, cr.press(scene, load=contact.load))",
-            "second: found prescribed load .*, as in the first",
-        ),
-        (
-            "cr.testing.assert_shear_certified(contact, np.zeros(61), force=0.0, sliding=[1])",
-            r"sliding: found shape \(1,\) of int64, expected",
-        ),
+        ("cr.testing.assert_agree(contact, cr.press(scene, load=contact.load))",
+         "second: found prescribed load .*, as in the first"),
+        ("cr.testing.assert_shear_certified(contact, np.zeros(61), force=0.0, sliding=[1])",
+         r"sliding: found shape \(1,\) of int64, expected"),
         ("cr.testing.assert_certified(scene, -1.0, approach=5e-5)", r"loads\[0\]: found -1"),
+        ("contact.plot('load')", "axes: found type str, expected Axes"),
+        ("contact.columns('loads', 'load')", "columns: found 'load', expected some of stat"),
+        ("cr.testing.assert_agree(contact, cr.shear(contact, force=0))", "type ShearState, exp"),
+        ("(p := cr.program(scene, load=1e-7)).loads(p.data.linear * np.nan)",
+         r"values\[0\]: found nan"),
     ],
-)
+)  # fmt: skip
 def test_wrong_types_are_said(call: str, said: str) -> None:
     with pytest.raises(cr.InputError, match=said):
         wrong(call)

@@ -22,15 +22,6 @@ def test_no_onset_where_an_indentation_falls() -> None:
         cr.onset_gradient(contact, 0)
 
 
-def test_equal_asperities_slide_last_together() -> None:
-    angles = 2 * np.pi * np.arange(6) / 6
-    ring = cr.Asperities(0.002 * np.stack((np.cos(angles), np.sin(angles)), axis=1), 0.02)
-    contact = cr.press(cr.Scene(1.0, ring, MATERIAL, 0.5, geometry="summit"), approach=1e-5)
-    np.testing.assert_array_equal(cr.onset_of_sliding(contact), 0.5 * contact.load)
-    with pytest.raises(cr.InputError, match="which slides last, together with others"):
-        cr.onset_gradient(contact, 1)
-
-
 def test_gradients_of_losses_have_bounds_only_where_order_is_proved(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -66,45 +57,3 @@ def test_summits_of_a_map_stay_with_it(tmp_path: Path) -> None:
     with pytest.raises(cr.InputError, match="units: found summits in µm, expected"):
         cr.Scene(1e4, named, MATERIAL, units=("mm", "N"))
     assert len(cr.Scene(1e4, named, MATERIAL, units=("um", "N"))) == len(named)
-
-
-def test_amplitudes_that_are_masked_or_no_numbers() -> None:
-    scene = replace(cr.gallery.case("two-equal").scene, friction=0.5)
-    masked = np.ma.masked_array([1e-9, -1e-9, 3e-9], mask=[0, 0, 1])
-    for given in (
-        {"force_amplitudes": masked},
-        {"force_amplitudes": [1e-9, -1e-9, 0.0], "load_amplitudes": masked},
-    ):
-        with pytest.raises(cr.InputError, match="_amplitudes: found 1 masked"):
-            cr.shakedown(scene, load=1e-7, **given)
-    for wrong in (None, "1e-8", [1e-8]):
-        with pytest.raises(cr.InputError, match="load_amplitude"):
-            cr.phase_losses(
-                scene, load=1e-7, load_amplitude=wrong, force_amplitude=1e-8, phases=[0.0]
-            )
-
-
-def test_maps_of_the_wrong_kind() -> None:
-    heights = np.random.default_rng(0).normal(size=(20, 20))
-    wrong = {"unit": None, "filled_pixels": np.zeros((20, 20)), "pixel": np.ones((3, 2))}
-    for name, value in wrong.items():
-        with pytest.raises(cr.InputError, match=f"^{name}: found"):
-            cr.surface.Surface(heights, **{"pixel": 1.0, name: value})
-
-
-def test_arguments_of_a_wrong_kind() -> None:
-    asperities = cr.Asperities.hexagonal(spacing=0.002, tip_radius=0.02, within=0.004)
-    contact = cr.press(cr.Scene(1.0, asperities, MATERIAL, 0.5), approach=5e-5)
-    state = cr.shear(contact, force=0.1 * contact.load)
-    program = cr.program(contact.scene, approach=5e-5)
-    for call, said in (
-        (lambda: contact.plot("load"), "axes: found type str, expected Axes"),
-        (lambda: contact.columns("loads", "load"), "columns: found 'load', expected some of stat"),
-        (lambda: cr.testing.assert_agree(contact, state), "found type ShearState, expected a Con"),
-        (
-            lambda: program.loads(np.full(len(program.data.linear), np.nan)),
-            r"values\[0\]: found nan",
-        ),
-    ):
-        with pytest.raises(cr.InputError, match=said):
-            call()

@@ -231,13 +231,9 @@ EXAMPLES = sorted(path for path in ROOT.rglob("*.py") if ">>> " in path.read_tex
 def test_examples_in_docstrings(path: Path, tmp_path: Path) -> None:
     scene = dataclasses.replace(paper(), friction=0.5)
     names = {
-        "cr": cr,
-        "np": np,
-        "scene": scene,
-        "contact": results()["Contact"],
-        "new_scene": NEW_SCENE,
+        "cr": cr, "np": np, "scene": scene, "contact": results()["Contact"], "new_scene": NEW_SCENE,
         "folder": tmp_path,
-    }
+    }  # fmt: skip
     module = ".".join(path.relative_to(ROOT.parent).with_suffix("").parts)
     found = doctest.DocTestFinder().find(importlib.import_module(module), extraglobs=names)
     runner = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE)

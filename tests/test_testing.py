@@ -68,20 +68,9 @@ def test_shear_forces() -> None:
     state = cr.shear(pressed, force=force)
     certificate = assert_shear_certified(pressed, state.forces, force=force, within=1e-10)
     assert list(certificate.status) == list(state.status)
-
-    def guilty(line: str, forces: Any, **options: Any) -> int:
-        message = failure(assert_shear_certified, pressed, forces, force=force, **options)
-        return first_named(message, line)
-
-    def changed(index: int, force: float) -> Any:
-        return np.where(np.arange(len(state.forces)) == index, force, state.forces)
-
-    # at f P, though it does not slide
-    assert guilty("  claimed to slide, proved not to: 1", changed(4, 0.5 * pressed.loads[4])) == 4
-    claims = state.status == "sliding"
-    line = f"  claimed to stick, proved to slide: {claims.sum()}"
-    assert claims[guilty(line, state.forces, sliding=claims & False)]
-    assert guilty("force error", changed(2, state.forces[2] * (1 + 1e-4)), within=1e-6) == 2
+    slides = np.where(np.arange(61) == 4, 0.5 * pressed.loads, state.forces)  # it does not
+    message = failure(assert_shear_certified, pressed, slides, force=force)
+    assert first_named(message, "  claimed to slide, proved not to: 1") == 4
     message = failure(assert_shear_certified, pressed, state.forces, force=force * 1.02)
     assert "the total force is not the prescribed one" in message.splitlines()[0]
 

@@ -117,7 +117,7 @@ def _problem(
     points, _, law = (each[touching] for each in mp.of_scene(scene))
     thresholds = law * mp.cube_root(P * P)
     friction = arb(scene.friction)
-    kernel = _kernel(points, mp.coupling(points, E), nu / (2 - nu))
+    kernel = tangential_kernel(points, mp.coupling(points, E), nu / (2 - nu))
     total = np.array([arb(float(each)) for each in force]) / friction
     q = exact(np.asarray(start)[touching].reshape(-1)) / friction
     X = (
@@ -142,7 +142,7 @@ def _near_the_limit(P: Balls, kernel: Balls, total: Balls) -> Balls:
     return along * (spread / (2 * missing)).sqrt()
 
 
-def _kernel(points: Balls, influence: Balls, bias: Any) -> Balls:
+def tangential_kernel(points: Balls, influence: Balls, bias: Any) -> Balls:
     """(2n, 2n) A_ij [(1 - bias) I + 2 bias d d']."""
     n = len(points)
     kernel = np.full((2 * n, 2 * n), arb(0))

@@ -1,7 +1,4 @@
-"""Friction under attack: where asperities are dragged back, near gross sliding, along paths.
-
-The judges are bristles in steps, exact levels, and arguments in whole numbers.
-"""
+"""Friction under attack: where asperities are dragged back, near gross sliding, along paths."""
 
 import json
 from fractions import Fraction
@@ -275,10 +272,7 @@ def test_energies_never_fall() -> None:
 
 @pytest.mark.parametrize("below", [-2, 0, 1, 7, 12, 20, 27])
 def test_forces_that_miss_gross_sliding_by_roundings(below: int) -> None:
-    """One asperity, whose approach is k L^(2/3) at the load L, in closed form.
-
-    Forces within 16 roundings count as f P, and the results are those of the force that they name.
-    """
+    """One asperity, whose approach is k L^(2/3) at the load L, in closed form."""
     rng = np.random.default_rng(20 + below)
     friction, load = float(rng.uniform(0.05, 2.0)), float(10 ** rng.uniform(-40, 10))
     scene = cr.Scene(1.0, cr.Asperities([[0, 0]], 0.02), MATERIAL, friction)

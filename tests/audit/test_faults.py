@@ -1,9 +1,4 @@
-"""Commands that are killed, out of room or in each other's way, and spoiled files of every kind.
-
-By default 2 trials of `run` without figures and `new`, and 18 fresh mutants, which get an answer or
-a clear error, in time and in the memory they warrant; with --full 300 trials of all commands, and
-3,000 mutants. Each batch is a process of its own under limits of memory and processor time.
-"""
+"""Commands that are killed, out of room or in each other's way, and spoiled files of every kind."""
 
 import json
 import os

@@ -1,7 +1,6 @@
 """The benchmark: its reference, and what it writes. No time is tested."""
 
 import json
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -69,27 +68,3 @@ def test_command(command: Any, tmp_path: Path) -> None:
     said = command("bench", "--quick", "--force", "--no-figures")
     assert said.status == 0
     assert f"in products on {tiny().machine['cores']} cores" in said.out
-
-
-def test_page(command: Any, tmp_path: Path) -> None:
-    """The block between the markers is replaced, and the figures beside the page are."""
-    page = tmp_path / "page.md"
-    page.write_text("no markers")
-    assert command("bench", "--page", "page.md").refuses("page.md: expected one line <!-- bench: b")
-    page.write_text("before\n<!-- bench: begin -->\nold\n<!-- bench: end -->\nafter\n")
-    assert command("bench", "--page", "page.md", "--no-figures").status == 0
-    written = page.read_text()
-    assert written.startswith("before\n<!-- bench: begin -->\n\nQuick run of ")
-    assert written.endswith("\n<!-- bench: end -->\nafter\n")
-    assert "| lattice   |         61 |       37 |" in written
-    assert "old" not in written
-    names = {path.name for path in (tmp_path / "figures").iterdir()}
-    assert names == {"work-precision.png", "cost.png"}
-    assert not (tmp_path / "bench-results/cost.png").exists()
-
-
-def test_solvers_without_known_errors_are_not_compared() -> None:
-    rows = tuple(replace(row, error=np.nan) for row in tiny().rows)
-    said = "\n".join(replace(tiny(), rows=rows).verdicts())
-    assert "the default solver is not compared, because no reference loads" in said
-    assert "frontier" not in said

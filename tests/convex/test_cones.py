@@ -1,9 +1,4 @@
-"""The proof of docs/theory/exact-cones.md, step by step, on the cones that the package sends.
-
-With the lift replaced by the powers of t every cone is a square; on the lift itself the tangents of
-the one-asperity energy are sums of cones with the weights below. Weights are shown not to be
-negative by their Bernstein coefficients, in rational arithmetic.
-"""
+"""The proof of docs/theory/exact-cones.md, step by step, on the cones that the package sends."""
 
 from fractions import Fraction
 from math import comb
@@ -46,10 +41,7 @@ def forms(cones: Any) -> list[tuple[Any, Any, Any]]:
 
 
 def tangents(cones: Any) -> list[Any]:
-    """x s^2 - 2 w s + y of every cone: not negative where x y >= w^2 and x, y >= 0.
-
-    s^2 in place of s for y4 >= y2^2, whose slots are powers of t^2.
-    """
+    """x s^2 - 2 w s + y of every cone: not negative where x y >= w^2 and x, y >= 0."""
     slopes = [s**2 if x == 1 else s for x, _, _ in forms(cones)]
     return [
         x * slope**2 - 2 * w * slope + y
@@ -58,11 +50,7 @@ def tangents(cones: Any) -> list[Any]:
 
 
 def bernstein(polynomial: Any, limit: Any) -> list[Fraction]:
-    """Its coefficients in the Bernstein basis of 0 <= s <= 1, 0 <= S <= limit.
-
-    The polynomial is a combination of products s^i (1-s)^(m-i) (S/limit)^j (1-S/limit)^(n-j) with
-    these, times binomials, as weights: none negative proves it not negative on the box.
-    """
+    """Its coefficients in the Bernstein basis of 0 <= s <= 1, 0 <= S <= limit."""
     scaled = sp.Poly(polynomial.subs(S, limit * S), s, S)
     m, n = scaled.degree(s), scaled.degree(S)
     power = {(i, j): scaled.coeff_monomial(s**i * S**j) for i in range(m + 1) for j in range(n + 1)}

@@ -7,12 +7,12 @@ import pytest
 from friction_scenes import FRICTION, KINDS, pressed, with_friction
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from levels_reference import Bristles
 from numpy.testing import assert_allclose
-from scenes import NAMED
+from scenes import NAMED, complementary_energy
 
 import convexrough as cr
-from convexrough.influence.coupling import inverse_distances
-from convexrough.sphere import hertz, mindlin
+from convexrough.sphere import mindlin
 
 NU = 0.3
 
@@ -33,15 +33,6 @@ def test_reference_losses_of_the_papers_example() -> None:
     below, above = cr.cycles(contact, np.array([0.387, 0.389]) * limit)
     assert below.loss_normalised < below.smooth_normalised
     assert above.loss_normalised > above.smooth_normalised
-
-
-def complementary_energy(contact: cr.Contact) -> float:
-    """V = sum (3/5) k P^(5/3) + P'AP / 2 - d'P, in the scene's own units."""
-    scene, P = contact.scene, contact.loads
-    k = hertz.local_coefficient(scene.material.contact_modulus, scene.relative_radii)
-    inverse = inverse_distances(scene.contact_points, scene.contact_points)
-    coupled = inverse @ P / (np.pi * scene.material.contact_modulus)
-    return float(0.6 * k @ P ** (5 / 3) + P @ coupled / 2 - scene.offsets @ P)
 
 
 @pytest.mark.sample(1)
@@ -69,48 +60,17 @@ def test_three_ways_to_the_energy(name: str) -> None:
         assert errors[2] / errors[1] == pytest.approx(0.25, abs=0.03)
 
 
-def plain_history(contact: cr.Contact, forces: list[float]) -> list[float]:
-    """Displacements by an independent model: elastic-slider elements fitted to first loading.
-
-    Any concave first-loading curve is that of springs with sliders in parallel; their displacement
-    control obeys Masing and memory by construction. The force is inverted by bisection.
-    """
-    limit = limit_of(contact)
-    grid = np.concatenate(([0.0], limit * (1 - np.linspace(1, 0, 80) ** 2)))[1:]
-    path = cr.history(contact, forces=grid)
-    x, q = path.displacements, grid
-    stiffness = np.concatenate((np.diff(q) / np.diff(x), [0.0]))
-    springs = stiffness[:-1] - stiffness[1:]
-    yields = x[1:]
-    position, anchors = 0.0, np.zeros(len(springs))
-
-    def force_at(target: float) -> tuple[float, np.ndarray]:
-        moved = np.clip(anchors, target - yields, target + yields)
-        return float(springs @ (target - moved)), moved
-
-    out = []
-    for force in forces:
-        low, high = -3 * x[-1], 3 * x[-1]
-        for _ in range(200):
-            middle = (low + high) / 2
-            if force_at(middle)[0] < force:
-                low = middle
-            else:
-                high = middle
-        position = (low + high) / 2
-        anchors = force_at(position)[1]
-        out.append(position)
-    return out
-
-
 @settings(max_examples=5, deadline=None)
 @given(st.lists(st.floats(-0.95, 0.95), min_size=1, max_size=25))
 def test_histories_against_springs_with_sliders(fractions: list[float]) -> None:
+    """Bristles in steps, which remember by construction."""
     contact = pressed("paper")
     forces = [fraction * limit_of(contact) for fraction in fractions]
-    ours = cr.history(contact, forces=forces).displacements
+    past, state, true = cr.history(contact, forces=forces), Bristles(contact, 300), []
+    for before, after in pairwise([0.0, *forces]):
+        true.append(state.to(np.linspace(before, after, 11)[1:]).displacement)
     scale = cr.shear(contact, force=0.95 * limit_of(contact)).displacement
-    assert_allclose(ours, plain_history(contact, forces), atol=1e-2 * scale)
+    assert_allclose(past.displacements, true, atol=1e-4 * scale)
 
 
 @settings(max_examples=8, deadline=None)

@@ -47,11 +47,7 @@ def test_tractions_are_those_of_the_field(high: float, low: float) -> None:
 @pytest.mark.sample(2)
 @pytest.mark.parametrize(("high", "low"), [(0.3, -0.3), (0.6, -0.6), (0.8, 0.1)])
 def test_slip_against_friction_costs_the_energy(high: float, low: float) -> None:
-    """Each asperity loses 4 times the integral of f p times the amplitude of slip, by either law.
-
-    In the annulus of a disc that sticks, and everywhere of one that slides, the slip at a distance
-    r is that at the rim of a contact of the radius r.
-    """
+    """Each asperity loses 4 times the integral of f p times the amplitude of slip."""
     cycle, found = worn("rough", high, low)
     scene, f = cycle.scene, 0.5
     c_t = float(mindlin.ratio(scene.material.poisson_ratio))

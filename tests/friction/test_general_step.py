@@ -1,7 +1,6 @@
 """Ways along a load path: the memory curve, the general step, and the step as a cone program."""
 
 from dataclasses import replace
-from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -10,12 +9,9 @@ from hypothesis import strategies as st
 from levels_reference import Bristles
 from numpy.testing import assert_allclose
 from path_scenes import ONE, TWO, path_of, shaded
-from scenes import MATERIAL, random_scenes
+from scenes import random_scenes
 
 import convexrough as cr
-from convexrough.friction.curve import MemoryCurve
-from convexrough.friction.general_step import followed
-from convexrough.friction.levels import FrictionLevels
 
 
 def agree(a: cr.LoadPath, b: cr.LoadPath, within: float) -> None:
@@ -44,26 +40,6 @@ def test_random_paths(sampled: tuple[cr.Scene, float], seed: int, ties: bool) ->
     if path.order == "fails":
         return
     agree(path, cr.load_path(scene, loads=P, forces=Q, general_steps=1), 1e-12)
-
-
-@pytest.mark.sample(1)
-@pytest.mark.parametrize("seed", [1, 5])
-def test_losses_of_the_steps_are_good_to_a_thousandth(seed: int) -> None:
-    """Or none are given: against those of the memory curve, which are proved."""
-    tips = cr.Asperities([[0.0, 0.0], [0.0025, 0.0], [0.0, 0.003]], 0.02)
-    contact = cr.press(cr.Scene(1.0, tips, MATERIAL, friction=0.5, geometry="summit"), load=1e-6)
-    rng = np.random.default_rng(seed)
-    P = np.r_[1.0, rng.uniform(0.2, 1.0, 4)] * contact.load
-    Q = 0.5 * P * np.r_[0.0, rng.uniform(-0.95, 0.95, 4)]
-    path = cr.load_path(contact.scene, start=contact, loads=P, forces=Q)
-    assert path.order == "proved"
-    levels = contact.cached(FrictionLevels)
-    points = [(Fraction(p), Fraction(q) / Fraction(0.5)) for p, q in zip(P, Q, strict=True)]
-    found = followed(levels, MemoryCurve.pressed(levels.load), points).losses
-    known = ~np.isnan(found)
-    assert known.sum() >= 4
-    within = 1e-3 * path.losses + 1e-6 * path.losses.max()
-    assert (np.abs(found - path.losses) <= within)[known].all()
 
 
 def test_where_order_fails() -> None:

@@ -1,6 +1,7 @@
 """States, cycles and paths against levels in a hundred digits: values, and proved bounds."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from flint import arb, ctx
 from friction_scenes import off
 from levels_reference import DIGITS, FRICTION, SCENES, Friction, displaced, pressed, reference
-from scenes import paper
+from scenes import hexagonal, paper
 
 import convexrough as cr
 from convexrough.arithmetic.balls import Ball
@@ -89,8 +90,7 @@ def test_a_prescribed_displacement(name: str, share: float) -> None:
 def test_levels_of_a_fine_lattice_are_proved_where_the_bound_of_a_rim_is_tiny() -> None:
     """The largest possible load of some asperity, 1e-23, is less than the error bounds of loads."""
     k, within = 12, math.sqrt(2 * 5e-5)
-    array = cr.Asperities.hexagonal(spacing=0.0025 / k, tip_radius=0.02 / k, within=within)
-    scene = cr.Scene(1.0, array, cr.Material(1.0, 0.3), friction=0.5, geometry="summit")
+    scene = replace(hexagonal(0.0025 / k, 0.02 / k, within), friction=0.5)
     contact = cr.press(scene, approach=5e-5)
     state = cr.shear(contact, force=0.25 * contact.load)
     assert state.order.startswith("proved")

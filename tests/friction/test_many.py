@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
-from path_scenes import shaded
 from scenes import MATERIAL, NAMED
 
 import convexrough as cr
@@ -32,6 +31,8 @@ def scattered(count: int) -> list[cr.Scene]:
     return [cr.Scene(1.0, cr.Asperities(each, 0.02), MATERIAL, F) for each in places]
 
 
+BASES: list[Any] = [1.0, 2.0, (1.0, 1.5)]
+
 #: What differs from scene to scene -> (scenes, approaches).
 SETS = {
     "heights": (rough(6), 5e-5),
@@ -39,13 +40,7 @@ SETS = {
     "tips": (rough(4, tips=0.1), 5e-5),
     "places by tips": (rough(3, tips=0.1, geometry="closest"), 5e-5),
     "places": (scattered(4), 5e-5),
-    "bases": (
-        [
-            replace(each, sphere_radius=radius)
-            for each, radius in zip(rough(3), [1.0, 2.0, (1.0, 1.5)], strict=True)
-        ],
-        5e-5,
-    ),
+    "bases": ([replace(rough(3)[k], sphere_radius=R) for k, R in enumerate(BASES)], 5e-5),
     "frictions": ([replace(each, friction=0.1 * k + 0.2) for k, each in enumerate(rough(3))], 5e-5),
     "one": (rough(1), 5e-5),
 }
@@ -101,19 +96,6 @@ def test_what_rows_do_not_prove_is_done_one_by_one(monkeypatch: pytest.MonkeyPat
         assert_array_equal(ends.status[k], ends[k].status)
     monkeypatch.setattr(rows, "MOST", 60)
     assert cr.press_many(scenes, approach=5e-5).alone.tolist() == [0, 1, 2]
-
-
-def test_cycles_of_rows_beside_one_that_is_not_proved() -> None:
-    loads = [0.01, 2.96]
-    contacts = cr.press_many([shaded()] * len(loads), load=loads)
-    assert contacts.alone.tolist() == [1]
-    assert_same(contacts, 1, cr.press(shaded(), load=2.96))
-    cycles = contacts.cycles(0.2 * contacts.loads)
-    for k in range(len(loads)):
-        one = cycles[k]
-        assert cycles.order[k] == one.order
-        assert cycles.losses[k] == one.loss
-        assert_array_equal(cycles.status[k], one.status)
 
 
 def test_warnings_of_many() -> None:

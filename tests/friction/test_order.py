@@ -1,12 +1,7 @@
-"""Order is proved where no indentation falls, and never where one is seen to.
-
-The judges are the levels in between, and the rates (I + A C)^-1 1 of numpy at stiffnesses within
-the bounds of the proof.
-"""
+"""Order is proved where no indentation falls, and never where one is seen to."""
 
 from fractions import Fraction
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import pytest
@@ -71,10 +66,7 @@ def test_order_of_thousands_is_proved_without_an_inverse() -> None:
 @pytest.mark.parametrize("aim", [0.5, 0.9, 1.0, 1.5, 2.0, 2.5])
 @pytest.mark.parametrize("seed", range(5))
 def test_order_of_random_layouts(seed: int, aim: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Proved where contacts are far apart and no indentation falls, and never where one does.
-
-    The same holds without an inverse, by sweeping.
-    """
+    """Proved where contacts are far apart and no indentation falls, and never where one does."""
     contact = random_contact(seed, aim)
     levels, down = levels_of(contact), falls(contact)
     found = levels.order([NOTHING])
@@ -95,35 +87,18 @@ def test_order_of_random_layouts(seed: int, aim: float, monkeypatch: pytest.Monk
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("moved", [0.0, 0.15])
-def test_swept_charges_against_all_asperities(seed: int, moved: float) -> None:
-    """Where moments prove the condition for far asperities, it holds at each of them; and rates are
-    above their bounds for random stiffnesses."""
+def test_swept_rates_of_many(seed: int, moved: float) -> None:
+    """Rates are above their bounds for random stiffnesses, and where all are the largest."""
     random = np.random.default_rng(seed)
-    points = (cr.Asperities.hexagonal, cr.Asperities.square)[seed % 2](
-        spacing=1.0, tip_radius=1.0, within=11.0
-    ).positions
-    points = points + moved * random.normal(size=points.shape)
-    influence = DenseInfluence.assemble(points, 1.0)
+    lattice = (cr.Asperities.hexagonal, cr.Asperities.square)[seed % 2]
+    points = lattice(spacing=1.0, tip_radius=1.0, within=11.0).positions
+    influence = DenseInfluence.assemble(points + moved * random.normal(size=points.shape), 1.0)
     n, matrix = len(points), influence.matrix
     c = influence.separations() * random.uniform(0.05, 0.3, n) * (random.random(n) > 0.1)
-    support = np.flatnonzero(c)
-    swept = sweeping._Swept(influence, support, c)
-    near = swept.neighbours(support, 12)
-    weights = swept.weights(sweeping.around, False, support, near)
-    last = swept.neighbours(support, 108)[:, -1]
-    gains = swept.gains(support, near, weights, last)
-    proved = np.flatnonzero(gains)
-    assert len(proved) > 0.5 * n
-    for k in proved[::7]:
-        i = support[k]
-        far = support[matrix[i, support] <= matrix[i, last[k]]]
-        far = far[far != i]
-        swept_potential = weights[k] @ swept.potentials(near[k][:, None], far)
-        assert (swept_potential >= (1 + gains[k]) * matrix[i, far]).all()
     bounds = swept_rates(influence, c, 1.0 - matrix @ c, np.zeros(n))
-    assert (bounds[support] > 0).all()
-    for _ in range(3):
-        y = np.linalg.solve(np.eye(n) + matrix * (c * random.random(n)), np.ones(n))
+    assert (bounds[c > 0] > 0).all()
+    for share in (1.0, *random.random((5, n))):
+        y = np.linalg.solve(np.eye(n) + matrix * (c * share), np.ones(n))
         assert (y >= bounds).all()
 
 
@@ -138,31 +113,6 @@ def test_weights_of_the_linear_program_are_not_negative() -> None:
         weights = swept.lightest(support, swept.neighbours(support, 40))
         assert (weights >= 0).all()
         assert weights.any()
-
-
-@pytest.mark.parametrize(
-    ("first", "second", "approach"),
-    [((1, 0), (0, 2), 4.5e-4), ((1, 0), (0, 3), 4.5e-4), ((1, 0), (0.3, 1.4), 4.5e-4),
-     ((0.6, 0.8), None, 3e-4)],
-    ids=["1:2", "1:3", "oblique", "slanted line"],
-)  # fmt: skip
-def test_order_on_lattices_of_other_shapes(first: Any, second: Any, approach: float) -> None:
-    """Rims are not at right angles to the direction from the middle, and lines have no width."""
-    i, j = (
-        np.meshgrid(np.arange(-40, 41), np.arange(-20, 21)) if second else (np.arange(-250, 251), 0)
-    )
-    places = np.multiply.outer(i, first) + np.multiply.outer(j, second or (0, 0))
-    asperities = cr.Asperities(0.0025 * places.reshape(-1, 2), 0.02)
-    radius = 40.0 if second else 600.0
-    scene = cr.Scene(radius, asperities, cr.Material(1.0, 0.3), friction=0.5, geometry="summit")
-    contact = cr.press(scene, approach=approach)
-    levels = levels_of(contact)
-    assert 0.3 < contact.crowding < 1.3
-    assert np.count_nonzero(contact.loads) > order.SWEPT
-    problem, n = levels.top.problem, len(levels.candidates)
-    c = 1.5 * np.cbrt(levels.top.loads.value) / problem.coefficients
-    bounds = swept_rates(problem.influence, c, 1.0 - problem.influence.apply(c), np.full(n, np.inf))
-    assert (bounds[c > 0] > 0).all()
 
 
 @pytest.mark.sample(2)

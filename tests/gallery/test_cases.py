@@ -10,7 +10,7 @@ import gallery_answers
 import numpy as np
 import pytest
 from gallery_answers import true_statuses
-from scenes import operators
+from scenes import operators, scaled
 
 import convexrough as cr
 from convexrough import gallery, solvers
@@ -127,10 +127,7 @@ def test_sheared_and_cycled(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["reversals-random", "reversals-nested"])
 def test_a_hundred_thousand_reversals(name: str, pytestconfig: pytest.Config) -> None:
-    """The last of them wipes all others out; without --full some are left out before it.
-
-    Memory curves of nested ranges grow with their number, so `history` refuses all of them.
-    """
+    """The last of them wipes all others out; without --full some are left out before it."""
     case, contact = gallery.case(name), pressed(name)
     assert len(case.history) > 100_000
     most = (5_000 if "nested" in name else len(case.history)) if pytestconfig.option.full else 25
@@ -140,14 +137,6 @@ def test_a_hundred_thousand_reversals(name: str, pytestconfig: pytest.Config) ->
     assert case.check_shear(past.asperity_forces[-1]).error < 1e-12
     assert within(past.displacements[-1], [case.displacement], past.displacement_errors[-1])
     assert (np.diff(past.losses) >= -1e-13 * past.losses[-1]).all()
-
-
-def scaled(scene: cr.Scene, length: float, modulus: float) -> cr.Scene:
-    a = scene.asperities
-    asperities = cr.Asperities(a.positions * length, a.tip_radii * length, a.heights * length)
-    material = cr.Material(scene.material.contact_modulus * modulus, scene.material.poisson_ratio)
-    radius = scene.sphere_radius * length
-    return cr.Scene(radius, asperities, material, scene.friction, scene.geometry)
 
 
 @pytest.mark.sample(3)

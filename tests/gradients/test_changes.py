@@ -23,12 +23,9 @@ def direction(contact: cr.Contact, holding: str, force: float, seed: int = 0) ->
         tip_radii=scene.asperities.tip_radii * rng.normal(size=n),
         positions=0.0025 * rng.normal(size=(n, 2)) * (np.ptp(scene.asperities.positions) / 0.02),
         sphere_radius=-0.3 * scene.sphere_radius,
-        contact_modulus=0.4 * scene.material.contact_modulus,
-        poisson_ratio=0.2,
-        friction=-0.6 * f,
-        force=0.8 * force,
-        **control,
-    )
+        contact_modulus=0.4 * scene.material.contact_modulus, poisson_ratio=0.2, friction=-0.6 * f,
+        force=0.8 * force, **control,
+    )  # fmt: skip
 
 
 def moved(setup: Setup, along: cr.Direction, holding: str, by: Any) -> Setup:
@@ -46,12 +43,9 @@ def moved(setup: Setup, along: cr.Direction, holding: str, by: Any) -> Setup:
 
 
 CASES = [
-    ("paper", "load", 0.5),
-    ("rough", "approach", 1e-6),
-    ("rough, closest", "load", 0.3),
-    ("rough, closest", "approach", 0.9),
-    ("steel", "approach", 0.5),
-]
+    ("paper", "load", 0.5), ("rough", "approach", 1e-6), ("rough, closest", "load", 0.3),
+    ("rough, closest", "approach", 0.9), ("steel", "approach", 0.5),
+]  # fmt: skip
 
 
 @pytest.mark.sample(2)

@@ -1,6 +1,7 @@
 """Derivatives of losses and displacements against differences of levels in 130 digits."""
 
 import pickle
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from flint import arb, ctx
 from friction_scenes import FRICTION, with_friction
 from gradient_oracle import DIGITS, STEP, Setup, assert_close, exact, known
 from levels_reference import SCENES, Holding, of_setup, pressed
-from scenes import paper
+from scenes import hexagonal, paper
 
 import convexrough as cr
 
@@ -25,10 +26,7 @@ NAMES = ("heights", "tip_radii", "positions", "sphere_radius", "contact_modulus"
 def assert_both(
     contact: cr.Contact, force: float, holding: Holding, sharp: float, seed: int = 0
 ) -> None:
-    """Values and derivatives, of arrays along random signs and by two entries, and their bounds.
-
-    sharp : what no bound may exceed of the largest derivative of its kind; 0 for any
-    """
+    """Values and derivatives, of arrays along random signs and by two entries, and their bounds."""
     loss = cr.cycle(contact, maximum=force).gradient(holding=holding)
     moved = cr.shear(contact, force=force).gradient(displacement=1.0, holding=holding)
     assert max(loss.balance_defect, moved.balance_defect) < 1e-14
@@ -125,10 +123,7 @@ def test_gross_sliding_from_one_side() -> None:
 
 
 def test_many_asperities_by_every_operator() -> None:
-    asperities = cr.Asperities.hexagonal(
-        spacing=2.5e-4, tip_radius=2e-3, within=2.5e-3, height_std=3e-8, seed=1
-    )
-    scene = with_friction(cr.Scene(1.0, asperities, cr.Material(1.0, 0.3), geometry="summit"))
+    scene = with_friction(hexagonal(2.5e-4, 2e-3, 2.5e-3, height_std=3e-8, seed=1))
     found = {}
     for kind in ("dense", "lattice", "scattered"):
         contact = cr.press(scene, load=1e-8, influence=kind)  # type: ignore[arg-type]
@@ -151,27 +146,22 @@ def test_normalised(name: str, holding: Any) -> None:
     force = 0.3 * contact.load
     gradient = cr.cycle(contact, maximum=force).gradient().normalised
     scene, rng = contact.scene, np.random.default_rng(2)
-    a, material = scene.asperities, scene.material
-    along = cr.Direction(
-        heights=1e-8 * rng.normal(size=len(a)), tip_radii=a.tip_radii * rng.normal(size=len(a)),
-        positions=1e-4 * rng.normal(size=(len(a), 2)), sphere_radius=0.7, contact_modulus=0.4,
-    )  # fmt: skip
+    a, E = scene.asperities, scene.material.contact_modulus
+    steps = {
+        "heights": 1e-8 * rng.normal(size=len(a)),
+        "positions": 1e-4 * rng.normal(size=(len(a), 2)),
+    }
+    steps |= {"tip_radii": a.tip_radii * rng.normal(size=len(a))}
 
     def normalised(h: float) -> float:
-        moved = cr.Asperities(
-            a.positions + h * along.positions, a.tip_radii + h * along.tip_radii,
-            a.heights + h * along.heights,
-        )  # fmt: skip
-        modulus = material.contact_modulus + h * along.contact_modulus
-        radius = scene.sphere_radius + h * along.sphere_radius
-        there = cr.Scene(radius, moved, cr.Material(modulus, 0.3), FRICTION, scene.geometry)
+        moved = replace(a, **{name: getattr(a, name) + h * steps[name] for name in steps})
+        material, radius = cr.Material(E + 0.4 * h, 0.3), scene.sphere_radius + 0.7 * h
+        there = cr.Scene(radius, moved, material, FRICTION, scene.geometry)
         pressed = cr.press(there, **{holding: getattr(contact, holding)})
         return cr.cycle(pressed, maximum=force).loss_normalised
 
-    slope = sum(
-        np.sum(getattr(gradient, each) * getattr(along, each))
-        for each in ("heights", "tip_radii", "positions", "sphere_radius", "contact_modulus")
-    )
+    slope = sum(np.sum(getattr(gradient, name) * step) for name, step in steps.items())
+    slope += 0.7 * gradient.sphere_radius + 0.4 * gradient.contact_modulus
     assert slope == pytest.approx((normalised(1e-4) - normalised(-1e-4)) / 2e-4, rel=1e-4)
     errors = np.abs(gradient.height_errors).max()
     assert 0 < errors <= SHARP * np.abs(gradient.heights).max()

@@ -24,7 +24,7 @@ from gradient_oracle import (
 )
 from levels_reference import Level, of_setup
 from path_scenes import shaded
-from scenes import MATERIAL
+from scenes import hexagonal
 
 import convexrough as cr
 from convexrough.friction.curve import MemoryCurve
@@ -35,10 +35,8 @@ SHARP = 1e-13
 @cache
 def small(geometry: Any = "summit", holding: str = "load", within: float = 0.0051) -> cr.Contact:
     """Nineteen asperities, or seven, of which some are open."""
-    asperities = cr.Asperities.hexagonal(
-        spacing=0.0025, tip_radius=0.02, within=within, height_std=2e-6, tip_radius_cv=0.1, seed=7
-    )
-    scene = with_friction(cr.Scene(1.0, asperities, MATERIAL, geometry=geometry))
+    scene = hexagonal(within=within, height_std=2e-6, tip_radius_cv=0.1, seed=7)
+    scene = with_friction(replace(scene, geometry=geometry))
     contact = cr.press(scene, approach=1.2e-5)
     assert 3 < np.count_nonzero(contact.loads) <= len(scene)
     return contact if holding == "approach" else cr.press(scene, load=contact.load)
@@ -136,6 +134,7 @@ def test_onset(holding: Any) -> None:
         return ends[-1][0], ends[-1][0]
 
     judge = Judge(Setup.of(contact, holding), value)
+    assert onset == pytest.approx(float(judge.at), rel=1e-13)
     gradient = cr.onset_gradient(contact, asperity, holding=holding)
     assert gradient.value == pytest.approx(onset, rel=1e-13)
     assert_slopes(judge, gradient, sharp=1e-10)
@@ -145,10 +144,7 @@ near_to = cache(lambda scene, load: cr.press(scene, load=load))
 
 
 def walked(contact: cr.Contact, steps: Any, start: Any, weights: Any) -> Callable[[Any, Any], Any]:
-    """From loads and forces, rational, to losses and displacements, in many digits.
-
-    By the pieces of the memory curve, with nothing else of the package.
-    """
+    """From loads and forces, rational, to losses and displacements, in many digits."""
 
     def value(setup: Setup, P: list[Fraction], Q: list[Fraction], f: Fraction) -> Any:
         levels: dict[Fraction, tuple[Any, Any]] = {}

@@ -12,7 +12,6 @@ from point_layouts import on_lattice
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair
 from convexrough.influence.convolution import SiteBox, through_waves
-from convexrough.influence.coupling import inverse_distances
 from convexrough.influence.sliced import Distances, Sliced, cut
 
 Array = NDArray[np.float64]
@@ -156,27 +155,3 @@ def test_points_are_where_they_are(seed: int, slices: int) -> None:
     bound = float(found.radius.max())
     assert bound < {2: 1e-4, 3: 1e-9, 4: 1e-10}[slices] * A.rounding(loads).each
     assert worst < 0.1 * bound
-
-
-@pytest.mark.sample(3)
-@pytest.mark.parametrize("seed", range(5))
-def test_loads_near_the_middle_take_smaller_transforms(seed: int) -> None:
-    """In turn a few loads, more of them, all of them, and few again, on one operator."""
-    points = perturbed(seed, 300)
-    A = on_lattice(points, 1.0)
-    rng = np.random.default_rng(seed)
-    sizes = []
-    for count in (1, 20, 150, 300, 5):
-        loads = np.where(np.arange(300) < count, rng.random(300), 0.0)
-        found = A.sums(Pair.exact(loads))
-        sizes.append(A._boxed_for(loads)[0].padded)
-        with ctx.workprec(200):
-            for m in (0, 17, 299):
-                exact = multiprecision.inverse_sum(*map(multiprecision.exact, (points, loads)), m)
-                assert among(found, m).contains(exact)
-        slopes = inverse_distances(points, points) ** 3 * loads
-        apart = points[:, None] - points
-        exactly = -(slopes[..., None] * apart).sum(axis=1)
-        assert np.abs(A.slopes(loads) - exactly).max() <= 1e-11 * np.abs(exactly).max()
-    assert sizes == sorted(sizes)
-    assert sizes[0] < sizes[3] == sizes[4] == A.box.padded

@@ -5,13 +5,16 @@ from fractions import Fraction
 from itertools import product
 from typing import Any
 
+import multiprecision
 import numpy as np
 import pytest
-from flint import arb, arb_mat
+from flint import arb
+from multiprecision import solve_linear
 from numpy.testing import assert_allclose
 from path_scenes import LARGEST, PAPER, SCENES, shaded
 from scenes import solve_exactly, twins
 from scipy.sparse import csc_matrix, vstack
+from vector_oracle import tangential_kernel
 
 import convexrough as cr
 from convexrough.arrays import Array
@@ -29,13 +32,9 @@ B, A = 19, 31
 def turned(angle: float, chords: int = 96) -> tuple[Array, Array]:
     """The amplitudes of an ellipse: 0.1 and 0.2 of the mean load, which is 0.9 of the largest."""
     return cr.elliptic_path(
-        load=0.0,
-        load_amplitude=0.09 * P,
-        force_amplitude=0.5 * 0.18 * P,
-        phase=np.radians(angle),
-        friction=0.5,
-        chords=chords,
-    )
+        load=0.0, load_amplitude=0.09 * P, force_amplitude=0.5 * 0.18 * P, phase=np.radians(angle),
+        friction=0.5, chords=chords,
+    )  # fmt: skip
 
 
 def swung(kind: str, size: float, along: int = 0) -> Array:
@@ -101,10 +100,7 @@ def test_paths_below_and_above_the_limit(angle: float | None) -> None:
 
 
 def test_a_limit_is_at_most_gross_sliding() -> None:
-    """No part of the contact lets go on these paths; the first leaves |Q| <= f P.
-
-    The last follows the load, so that nothing ever slides.
-    """
+    """No part of the contact lets go on these paths; the first leaves |Q| <= f P."""
     rises = np.array([0.0, 1.3 * P])
     limit = cr.shakedown(PAPER, load=P, load_amplitudes=rises, force_amplitudes=[0.03 * P] * 2)
     assert limit.factor == limit.gross == pytest.approx(0.5 / 0.03)
@@ -142,11 +138,7 @@ LEFT = 1e-5
 
 
 class Stuck:
-    """Asperities that stick until they slide, at constant load: |q_i| <= P_i, step by step.
-
-    Each step is Moreau's: the least (1/2) d'K d over forces q = before + d within friction that add
-    up. Its multipliers are the slips. Vectors, n of them, in the order x_1, y_1, ...
-    """
+    """Asperities that stick until they slide, at constant load: |q_i| <= P_i, step by step."""
 
     def __init__(self, stiffness: Array, limits: Array) -> None:
         self.K, self.P, self.q = stiffness, limits, np.zeros(2 * len(limits))
@@ -176,10 +168,7 @@ class Stuck:
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("kind", ["elastic", "vector"])
 def test_cycles_below_and_above_melans_limit(kind: Any) -> None:
-    """From a first loading that slides: slip dies out 1 % below, and goes on 1 % above.
-
-    Vectors turn towards the state at rest slowly: the slip of a cycle halves in some ten of them.
-    """
+    """From a first loading that slides: slip dies out 1 % below, and goes on 1 % above."""
     contact = cr.press(PAPER, load=P)
     problem = contact.cached(FrictionProblem)
     n = len(problem)
@@ -214,42 +203,20 @@ def test_cycles_below_and_above_melans_limit(kind: Any) -> None:
 def exact_shares(
     scene: cr.Scene, load: float, vector: bool, along: int
 ) -> tuple[list[arb], list[list[arb]]]:
-    """P_i and the forces Y_i under a unit force along x or y, in balls, without the package.
-
-    By the scalar kernel, or by Cerruti's tensor, c_t B = (1/pi G r) [(1 - nu) I + nu d d'].
-    """
-    loads = solve_exactly(scene, load=load).loads
-    touching = [i for i, each in enumerate(loads) if each > 0]
-    points = [[arb(float(x)) for x in scene.asperities.positions[i]] for i in touching]
-    nu, size = arb(scene.material.poisson_ratio), 2 if vector else 1
-    n = len(touching)
-    stiffness = arb_mat(size * n, size * n)
-    for a, i in enumerate(touching):
-        R = 1 / (1 / arb(scene.sphere_radius) + 1 / arb(float(scene.asperities.tip_radii[i])))
-        radius = (loads[i] * R * 3 / 4).root(3)
-        for c in range(size):
-            stiffness[size * a + c, size * a + c] = 1 / (2 * radius)
-        for b in range(n):
-            if a == b:
-                continue
-            d = [x - y for x, y in zip(points[a], points[b], strict=True)]
-            r = (d[0] * d[0] + d[1] * d[1]).sqrt()
-            if not vector:
-                stiffness[a, b] = 1 / (arb.pi() * r)
-                continue
-            for c in range(2):
-                for e in range(2):
-                    tensor = (1 - nu if c == e else arb(0)) + nu * d[c] * d[e] / r**2
-                    stiffness[2 * a + c, 2 * b + e] = 2 * tensor / ((2 - nu) * arb.pi() * r)
-    together = arb_mat(size * n, size)
-    for a in range(n):
-        for c in range(size):
-            together[size * a + c, c] = arb(1)
-    moved = stiffness.solve(together)
-    shares = moved * (together.transpose() * moved).inv()
-    return [loads[i] for i in touching], [
-        [shares[size * a + c, along] for c in range(size)] for a in range(n)
-    ]
+    """P_i and the forces Y_i under a unit force along x or y, in balls, without the package."""
+    exact, size = solve_exactly(scene, load=load).loads, 2 if vector else 1
+    touching = [i for i, each in enumerate(exact) if each > 0]
+    P, nu = np.array([exact[i] for i in touching]), arb(scene.material.poisson_ratio)
+    points, _, law = (each[touching] for each in multiprecision.of_scene(scene))
+    stiffness = multiprecision.coupling(points, arb(scene.material.contact_modulus))
+    if vector:
+        stiffness = tangential_kernel(points, stiffness, nu / (2 - nu))
+    own = np.repeat(2 * law / (3 * multiprecision.cube_root(P)), size)
+    stiffness[np.diag_indices(len(own))] = own
+    together = multiprecision.exact(np.tile(np.eye(size), (len(P), 1)))
+    moved = np.column_stack([solve_linear(stiffness, each) for each in together.T])
+    share = solve_linear(together.T @ moved, multiprecision.exact(np.eye(size)[along]))
+    return list(P), (moved @ share).reshape(-1, size).tolist()
 
 
 @pytest.mark.sample(3)
@@ -273,9 +240,7 @@ def test_enclosures_hold_the_limit_in_ball_arithmetic(
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("lie", ["nothing", "noise", "doubled", "backwards"])
-def test_a_solver_that_lies_does_not_move_the_limit(
-    lie: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_solver_that_lies_does_not_move_the_limit(lie: str, monkeypatch: Any) -> None:
     """The bounds get worse, and stay true; or the answer is refused."""
     swing = np.array([[0.0, 1.0], [0.3, -0.8], [-0.6, 0.1]]) * RADIUS
     honest = melan.run_clarabel

@@ -1,46 +1,11 @@
 """Quantities with units, and files as journals want them."""
 
 import re
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-import pytest
-from figure_checks import fits, texts
 from matplotlib.figure import Figure
-from scenes import PAPER_APPROACH, paper
 
-import convexrough as cr
 from convexrough import plots
-from convexrough.compare import compare
-from convexrough.plots.style import quantity
-from convexrough.solvers import Newton
-
-
-@pytest.mark.parametrize(
-    ("value", "unit", "said"),
-    [
-        (4.12e-3, "mm", "4.12 µm"),
-        (0.5, "N", "500 mN"),
-        (591.0, "N/mm²", "591 MPa"),
-        (4.82e-3, "N mm", "4.82 µJ"),
-        (0.0, "mm", "0 mm"),
-        (4.12e-5, "", r"$4.12\times 10^{-5}$"),
-        (12.0, "$", r"12 \$"),
-    ],
-)
-def test_quantities_are_written_one_way(value: float, unit: str, said: str) -> None:
-    assert quantity(value, unit) == said
-
-
-def scattered(load: float = 2.0) -> cr.Contact:
-    random = np.random.default_rng(4)
-    points = random.uniform(-0.12, 0.12, (90, 2))
-    asperities = cr.Asperities(points, random.uniform(0.02, 0.06, 90), random.normal(0, 2e-4, 90))
-    material = cr.Material.from_youngs(210e3, 0.3)
-    scene = cr.Scene(10.0, asperities, material, friction=0.4, units=("mm", "N"))
-    return cr.press(scene, load=load)
 
 
 def test_files_keep_their_text_and_pixels(tmp_path: Path) -> None:
@@ -56,26 +21,3 @@ def test_files_keep_their_text_and_pixels(tmp_path: Path) -> None:
     before = text
     plots.save(figure, tmp_path / "a.svg", "svg")
     assert (tmp_path / "a.svg").read_text(encoding="utf-8") == before  # no date inside
-
-
-def test_fretting_and_gradients_are_drawn_with_units() -> None:
-    contact = scattered()
-    cycle = cr.cycle(contact, maximum=0.2 * contact.load)
-    fits(plots.gradient_figures(cycle.gradient(), of="D_0")["gradient"])
-    figure = plots.fretting_figures(cr.fretting(cycle))["fretting"]
-    fits(figure)
-    said = " ".join(text.get_text() for text in texts(figure))
-    assert all(unit in said for unit in ("nm]", "nJ]", "GPa]")), said
-
-
-@pytest.mark.parametrize("seconds", [(1e-4, 2e-4, 5e-4), (0.95, 1.05), (1e-4, 10.0), (0.1,)])
-def test_the_axis_of_times(seconds: tuple[float, ...]) -> None:
-    found = compare(paper(), approach=PAPER_APPROACH, solvers=[Newton()])
-    (entry,) = found.entries
-    assert entry.contact
-    timed = [replace(entry.contact, seconds=each) for each in seconds]
-    named = [replace(entry, solver=f"a solver of long name {i}") for i in range(len(seconds))]
-    entries = [replace(one, contact=each) for one, each in zip(named, timed, strict=True)]
-    figure: Any = replace(found, entries=tuple(entries)).plot().figure
-    fits(figure)
-    assert len({text.get_text() for text in texts(figure) if "10^" in text.get_text()}) > 1

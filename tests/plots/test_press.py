@@ -2,18 +2,16 @@
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
 from figure_checks import fits
-from matplotlib.patches import Ellipse
 from numpy.testing import assert_allclose
 from scenes import MATERIAL, PAPER_APPROACH, paper, rough, steel
 
 import convexrough as cr
 from convexrough import fields
-from convexrough.plots import press_figures, shear_figures
+from convexrough.plots import press_figures
 
 
 def few(*points: tuple[float, float]) -> cr.Contact:
@@ -26,17 +24,6 @@ def dense(spacing: float) -> cr.Contact:
     return cr.press(cr.Scene(1.0, asperities, MATERIAL, geometry="summit"), load=4.5e-7)
 
 
-def doubted(scope: Any, undecided: int) -> cr.Contact:
-    """The paper's contact with doubt cast on the last of its touching asperities."""
-    contact = cr.press(paper(), approach=PAPER_APPROACH)
-    codes = contact.certificate.codes.copy()
-    codes[37 - undecided : 37] = 0
-    if scope == "none":
-        codes[:] = 0
-    certificate = dataclasses.replace(contact.certificate, scope=scope, codes=codes)
-    return dataclasses.replace(contact, certificate=certificate)
-
-
 CASES: dict[str, Callable[[], cr.Contact]] = {
     "one": lambda: few((0, 0)),
     "three": lambda: few((0, 0), (3e-3, 0), (-1e-3, 2.5e-3)),
@@ -46,8 +33,6 @@ CASES: dict[str, Callable[[], cr.Contact]] = {
     "2200": lambda: dense(3e-4),
     "4000": lambda: dense(2.2e-4),
     "nothing": lambda: cr.press(paper(), approach=-1e-6),
-    "undecided": lambda: doubted("global", 6),
-    "not proved": lambda: doubted("none", 37),
 }
 
 
@@ -78,18 +63,3 @@ def test_the_colours_and_the_profile_show_the_pressure() -> None:
     (smooth,) = profile.lines
     assert_allclose(np.hypot(*smooth.get_data()), 1, rtol=1e-12)
     assert chart.get_xlim() == profile.get_xlim()
-
-
-def test_an_ellipse_beside_the_contact() -> None:
-    asperities = paper().asperities
-    contact = cr.press(cr.Scene((1.0, 2.5), asperities, MATERIAL, 0.5, "summit"), load=3e-7)
-    limit = 0.5 * contact.load
-    states = [cr.shear(contact, force=share * limit) for share in (0.3, 0.6)]
-    figures = press_figures(contact) | shear_figures(states)
-    smooth = cr.smooth(contact.scene, load=contact.load)
-    assert isinstance(smooth, cr.SmoothEllipsoid)
-    axes = np.array(smooth.semi_axes) / smooth.contact_radius
-    (contour,) = figures["pressure"].axes[0].findobj(Ellipse)
-    assert_allclose([contour.width, contour.height], 2 * axes)
-    whole, stick = figures["stick_slip"].axes[1].findobj(Ellipse)
-    assert_allclose(stick.width / whole.width, np.cbrt(1 - 0.6))

@@ -125,20 +125,18 @@ def assert_shown(shown: Opened, contact: cr.Contact, fraction: float, index: int
     sphere = cr.smooth(contact.scene, load=contact.load)
     X0 = sphere.displacement(limit)
     assert float(shown.text("fraction")) == fraction
-    assert shown.number("q") == float(f"{fraction * limit:.5g}")
-    assert shown.number("x") == float(f"{state.displacement:.5g}")
-    assert shown.number("x_part") == float(f"{state.displacement / X0:.5g}")
+    share = state.forces[index] / (0.5 * contact.loads[index])
+    for name, value in (
+        *(("q", fraction * limit), ("x", state.displacement), ("x_part", state.displacement / X0)),
+        *(("w", steady.loss_normalised), ("w_smooth", steady.smooth_normalised)),
+        *(("load", contact.loads[index]), ("share", share)),
+        ("moved", state.displacements[index] / X0),
+    ):
+        assert shown.number(name) == float(f"{value:.5g}"), name
     assert shown.number("x_error") >= steady.displacement_error
-    assert shown.number("w") == float(f"{steady.loss_normalised:.5g}")
-    assert shown.number("w_smooth") == float(f"{steady.smooth_normalised:.5g}")
     slide = (state.status == "sliding").sum()
     assert shown.text("said").startswith(f"{slide} of 37 slide")
     assert shown.page.locator("#map circle.sliding").count() == slide
-
-    load = contact.loads[index]
-    assert shown.number("load") == float(f"{load:.5g}")
-    assert shown.number("share") == float(f"{state.forces[index] / (0.5 * load):.5g}")
-    assert shown.number("moved") == float(f"{state.displacements[index] / X0:.5g}")
     status = {"partial": "partial slip"}.get(state.status[index], state.status[index])
     assert (shown.text("status"), shown.text("state")) == (contact.status[index], status)
     stick = state.stick_radii[index] / contact.contact_radii[index]
@@ -149,7 +147,7 @@ def assert_shown(shown: Opened, contact: cr.Contact, fraction: float, index: int
     past = cr.history(contact, forces=limit * share.clip(-fraction, fraction))
     assert moved == near(past.displacements / X0)
     own_moved, own_share = shown.points("#own .line").T
-    assert own_share == near(past.asperity_forces[:, index] / (0.5 * load))
+    assert own_share == near(past.asperity_forces[:, index] / (0.5 * contact.loads[index]))
     assert own_moved == near(past.asperity_displacements[:, index] / X0)
     at = shown.page.locator("#whole .now").first.get_attribute("d")
     assert at == f"M{moved[0]:g} {share[0]:g}h0"

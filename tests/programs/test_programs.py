@@ -8,19 +8,14 @@ import highspy
 import numpy as np
 import pytest
 import scs
-from scenes import PAPER_APPROACH
+from scenes import PAPER_APPROACH, complementary_energy, hexagonal
 from scipy import sparse
 
 import convexrough as cr
 from convexrough.programs import program
 
 #: The source paper's, its inner 19 asperities.
-SCENE = cr.Scene(
-    1.0,
-    cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0051),
-    cr.Material(contact_modulus=1.0, poisson_ratio=0.3),
-    geometry="summit",
-)
+SCENE = hexagonal(within=0.0051)
 CONTACT = cr.press(SCENE, approach=PAPER_APPROACH)
 CONTROLS: dict[str, dict[str, float]] = {
     "approach": {"approach": PAPER_APPROACH},
@@ -34,13 +29,8 @@ FEW = 8
 
 def energy(control: str) -> float:
     """Phi, from its definition: docs/theory/convexity.md, (1)."""
-    scene, P = CONTACT.scene, CONTACT.loads
-    R, modulus = scene.relative_radii, scene.material.contact_modulus
-    local = 0.6 * (9 / (16 * modulus**2 * R)) ** (1 / 3) * P ** (5 / 3)
-    r = np.hypot(*(scene.asperities.positions[:, None] - scene.asperities.positions).T)
-    np.fill_diagonal(r, np.inf)
-    depth = scene.offsets + (PAPER_APPROACH if control == "approach" else 0.0)
-    return float(local.sum() + P @ (1 / (np.pi * modulus * r)) @ P / 2 - depth @ P)
+    depth = PAPER_APPROACH if control == "approach" else 0.0
+    return complementary_energy(CONTACT) - depth * CONTACT.loads.sum()
 
 
 def matrix(data: Any, name: str, shape: tuple[int, int]) -> Any:

@@ -1,7 +1,4 @@
-"""Forged proof files: whatever the checker accepts is true by the 50-digit reference.
-
-30 forgeries by default; for more, CONVEXROUGH_FORGERIES=20000 pytest tests/proof/test_attack.py
-"""
+"""Forged proof files: whatever the checker accepts is true by the 50-digit reference."""
 
 import json
 import os

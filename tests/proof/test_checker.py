@@ -100,9 +100,7 @@ def test_it_runs_alone(document: Any, tmp_path: Path) -> None:
         (b" " * (checker.MOST_BYTES + 1), "more than"),
     ],
 )
-def test_unreadable(
-    contents: bytes, reason: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_unreadable(contents: bytes, reason: str, tmp_path: Path, capsys: Any) -> None:
     path = tmp_path / "proof.json"
     path.write_bytes(contents)
     assert checker.main([str(path)]) == 2
@@ -125,10 +123,7 @@ def scaled(values: list[str], factor: float) -> list[str]:
 def wrong(
     document: Any, reason: str, error: type[Exception] = Refused, sha256: str = "", **changes: Any
 ) -> None:
-    """That the checker refuses a proof, changed at the keys named a__b__c, for this reason.
-
-    sha256 : "fits" where the hash is that of the changed scene
-    """
+    """That the checker refuses a proof, changed at the keys named a__b__c, for this reason."""
     document = deepcopy(document)
     for keys, value in changes.items():
         *path, last = (int(key) if key.isdigit() else key for key in keys.split("__"))
@@ -225,10 +220,7 @@ def test_what_is_damaged_is_named(few: Any, place: str) -> None:
 
 
 def test_an_asperity_that_is_dragged_along_is_refused() -> None:
-    """One between six blunt ones loses load as the total rises, so regains some in shear.
-
-    There Ciavarella and Jaeger's difference is no friction state.
-    """
+    """One between six blunt ones loses load as the total rises, so regains some in shear."""
     six = [[np.cos(t), np.sin(t)] for t in np.arange(6) * np.pi / 3]
     points = 0.0025 * np.array([[0, 0], *six])
     ring = scenes.on_sphere(points, [0.02, *[0.1] * 6], [-1e-5, *[0.0] * 6], friction=0.5)

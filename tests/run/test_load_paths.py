@@ -44,13 +44,8 @@ reference = LOAD
 """
 
 
-def test_nothing_is_proved_where_order_fails(
-    run: Any, command: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A small low asperity between five crowded ones loses load as the load rises.
-
-    How exact the steps of such a path are is tested in tests/friction; here few are enough.
-    """
+def test_nothing_is_proved_where_order_fails(run: Any, command: Any, monkeypatch: Any) -> None:
+    """A small low asperity between five crowded ones loses load as the load rises."""
     for name in ("SETTLED", "SETTLED_MOTION"):
         monkeypatch.setattr(general_step, name, np.inf)
     low = shaded().asperities

@@ -29,7 +29,6 @@ ELLIPSE = "ellipse = {load = 1.0, force_amplitude = 0.1, phase = "
 
 MISTAKES = [
     # [asperities]
-    (layout("spacing = -0.1"), "[asperities] spacing: found -0.1, expected a positive number"),
     (layout("spacing = 1e-61"), "[asperities] spacing: found 1e-61, expected a size from 1e-60"),
     (layout("spacing = 1\nspaceing = 1"),
      '[asperities] spaceing: unknown key, did you mean "spacing"?'),
@@ -56,8 +55,6 @@ MISTAKES = [
     (scene_text(normal=""), "[normal] approach, load: found neither, expected exactly one of the"),
     (scene_text(more='[""]'), '[""]: unknown table, expected a name'),
     (scene_text(more="[frictoin]"), '[frictoin]: unknown table, did you mean "friction"?'),
-    (scene_text(more="[shear]\nfractions = [0.1]"),
-     "[friction]: missing table, needed with [shear]"),
     (scene_text(more="[gradient]\nof = 'loss'\nfraction = 0.1"),
      "[friction]: missing table, needed with the loss of [gradient]"),
     (scene_text(more="[solver]\nname = 'newtn'"),
@@ -90,8 +87,6 @@ MISTAKES = [
     *((stage(f"[shakedown]\nload = 1\nforce = {it}\nforce_amplitudes = [1, -1]"),
        f"[shakedown] force: found {it}, expected a finite number, or with kind = \"vector\"")
       for it in ("[0.2]", "[0.2, 0.1]")),
-    (stage("[shakedown]\nload = 1\nforce_amplitudes = 1.0"),
-     "[shakedown] force_amplitudes: found 1.0, expected a valid list"),
     (stage(f"{VECTOR}[[1, 0]]\nforce = 0.1"),
      "[shakedown] force: found 0.1, expected a pair [x, y]"),
     (stage('[gradient]\nof = "los"'),
@@ -133,34 +128,23 @@ def refused(folder: Path, text: str) -> list[str]:
 def test_all_mistakes_are_told_at_once(tmp_path: Path) -> None:
     text = "r = 1\n[sphere]\nradius = -1\n[material]\npoisson_ratio = 0.6\n[normal]\n"
     assert [line.split(":")[0] for line in refused(tmp_path, text)] == [
-        "r",
-        "[sphere] radius",
-        "[material] poisson_ratio",
-        "[material] contact_modulus, youngs_modulus",
-        "[normal] approach, load",
-        "[asperities]",
-    ]
+        "r", "[sphere] radius", "[material] poisson_ratio",
+        "[material] contact_modulus, youngs_modulus", "[normal] approach, load", "[asperities]",
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize(
     ("wrong", "meant", "why"),
     [
         ("spacing = 0,0025", "spacing = 0.0025", "a decimal point"),
-        ("spacing=2,5e-3 # mm", "spacing = 2.5e-3", "a decimal point"),
         ("spacing = 0.0025 m", "spacing = 0.0025", "without unit"),
-        ("spacing = 2.5mm", "spacing = 2.5", "without unit"),
-        ("spacing = 2.5 µm", "spacing = 2.5", "without unit"),
         ("spacing = 2.5D-3", "spacing = 2.5e-3", "exponent"),
         ("spacing = .0025", "spacing = 0.0025", "both sides"),
-        ("spacing = 5.", "spacing = 5.0", "both sides"),
         ("spacing: 0.0025", "spacing = 0.0025", "equals sign"),
         ("spacing = 0.0025;", "spacing = 0.0025", "end of the line"),
-        ("spacing = 0.0025,", "spacing = 0.0025", "end of the line"),
         ("pattern = hexagonal", 'pattern = "hexagonal"', "straight quotes"),
         ("pattern = “hexagonal”", 'pattern = "hexagonal"', "straight quotes"),
-        ("spacing = 2.5e-3;", "spacing = 2.5e-3", "end of the line"),
         ("spacing = Inf", "spacing = inf", "lower case"),
-        ("convert = True", "convert = true", "lower case"),
         ("path = my summits.csv", 'path = "my summits.csv"', "straight quotes"),
     ],
 )

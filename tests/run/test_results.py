@@ -126,10 +126,7 @@ def test_contact_beyond_the_sphere(run: Any, command: Any) -> None:
 
 
 def test_an_array_that_ends_inside_the_contact_is_told() -> None:
-    """By contact at the rim, as with a radius in the wrong unit, or where every asperity touches.
-
-    On a flat base that is meant. Corners of a square may be open.
-    """
+    """By contact at the rim, as with a radius in the wrong unit, or where all asperities touch."""
     wide, few, seven, one = (
         cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=within)
         for within in (0.0102, 0.0045, 0.004, 0.002)

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
 from scenes import NAMED, PAPER_APPROACH, hexagonal, paper, prescribed
 
 import convexrough as cr
@@ -21,8 +20,6 @@ from convexrough.solvers import (
 )
 from convexrough.solvers.conic import ConeBoxes, LiftedProgram, solve_in
 from convexrough.solvers.programs import ProgramAnswer
-from convexrough.vector_shear.cones import FrictionConic
-from convexrough.vector_shear.problem import FrictionProblem
 
 SOLVERS = [Conic(), ConicCVXPY()]
 OTHERS = [ConicCVXPY(solver=name) for name in ("SCS", "QOCO")]
@@ -127,16 +124,6 @@ def test_too_large_for_memory(monkeypatch: pytest.MonkeyPatch) -> None:
         LiftedProgram.assemble(problem, boxes)
 
 
-def test_a_refused_friction_program_gives_its_last_forces() -> None:
-    contact = cr.press(replace(paper(), friction=0.3), approach=PAPER_APPROACH)
-    problem = contact.cached(FrictionProblem)
-    total = np.array([0.3, 0.4]) * problem.loads.sum()
-    with pytest.raises(cr.SolverError, match=r"accepted are 1e-18 and 1e-14; try") as refused:
-        FrictionConic(accepted=1e-18).solve(problem, total)
-    assert refused.value.iterate is not None
-    assert_allclose(refused.value.iterate.sum(axis=0), total, rtol=1e-7)
-
-
 def errors(scene: cr.Scene, given: dict[str, float], solver: BristleQP) -> Any:
     """(n,) errors of the loads over the largest load."""
     found, true = cr.press(scene, **given, solver=solver), cr.press(scene, **given)
@@ -154,16 +141,3 @@ def test_second_order(name: str, control: str) -> None:
     mean_square = [np.sqrt(np.mean(e**2)) for e in found]
     order = -np.polyfit(np.log(counts), np.log(mean_square), 1)[0]
     assert order == pytest.approx(2.0, abs=0.15)
-
-
-@pytest.mark.parametrize("control", CONTROLS)
-def test_a_box_cut_to_the_convex_range(control: str) -> None:
-    """The a priori bounds are not convex, the contact is: answered, and certified."""
-    scene, approach = hexagonal(within=0.03), 5e-4
-    problem = NormalProblem.assemble(scene, approach=approach)
-    assert problem.convexity_number(problem.bounds(problem.approach_bound)) > 1.5
-    given = prescribed(scene, approach, control)
-    contact, reference = cr.press(scene, solver=BristleQP(32), **given), cr.press(scene, **given)
-    assert contact.certificate.all_proved
-    assert np.abs(contact.loads - reference.loads).max() < 1e-6 * reference.loads.max()
-    assert contact.certificate.scope == reference.certificate.scope

@@ -24,12 +24,7 @@ def displacement(r: Any, angle: Any, nu: float, share: float = 1.0) -> Any:
 
 
 def cerruti(r: float, angle: float, nu: float, a: float, q0: float) -> float:
-    """Both surfaces' displacement along x at (r, angle), from q0 sqrt(1 - r^2/a^2) on a disc.
-
-    Cerruti: a force at a distance s moves both surfaces by (1/(pi G s)) (1 - nu + nu cos^2 w), w
-    the angle of the line to it. In polar coordinates about the point, 1/s meets the area s ds dw:
-    what is left is the traction along each line through the point that cuts the disc.
-    """
+    """Both surfaces' displacement along x at (r, angle), from q0 sqrt(1 - r^2/a^2) on a disc."""
     roots, root_weights = np.polynomial.legendre.leggauss(40)
     if r < a:  # every line does
         w = np.pi * np.arange(400) / 400
@@ -63,7 +58,8 @@ def test_displacement_is_cerrutis_integral(ratio: float, nu: float) -> None:
 @pytest.mark.sample(4)
 @pytest.mark.parametrize("fraction", [0.01, 0.5, -0.5, 0.95, 1.0])
 @pytest.mark.parametrize("name", ["paper", "rough, closest", "steel"])
-def test_the_traction_of_each_asperity_integrates_to_its_force(name: str, fraction: float) -> None:
+def test_fields_of_each_asperity_integrate_to_its_forces(name: str, fraction: float) -> None:
+    """Tractions to forces, pressures to loads."""
     contact = pressed(name)
     state = cr.shear(contact, force=fraction * FRICTION * contact.load)
     touching = contact.loads > 0
@@ -71,14 +67,16 @@ def test_the_traction_of_each_asperity_integrates_to_its_force(name: str, fracti
     c = state.stick_radii[touching]
     nodes, weights = np.polynomial.legendre.leggauss(24)
     phi, weights = np.pi / 4 * (nodes + 1), np.pi / 4 * weights
-    forces = np.zeros(len(a))
+    forces, loads = np.zeros((2, len(a)))
     for inner, outer in ((0 * c, c), (c, a)):  # r^2 = outer^2 - (outer^2 - inner^2) cos^2(phi)
         squared = outer**2 - inner**2
         for angle, weight in zip(phi, weights, strict=True):
             r = np.sqrt(outer**2 - squared * np.cos(angle) ** 2)
-            traction = fields.traction(state, centres + r[:, None] * [0.6, 0.8])
-            forces += weight * 2 * np.pi * squared * np.cos(angle) * np.sin(angle) * traction
+            points, ring = centres + r[:, None] * [0.6, 0.8], np.pi * squared * np.sin(2 * angle)
+            forces += weight * ring * fields.traction(state, points)
+            loads += weight * ring * fields.pressure(contact, points)
     assert_allclose(forces, state.forces[touching], rtol=1e-7)
+    assert_allclose(loads, contact.loads[touching], rtol=1e-7)
     assert forces.sum() == pytest.approx(state.force, rel=1e-7)
 
 

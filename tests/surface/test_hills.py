@@ -20,10 +20,7 @@ def around(heights: Map, place: Place) -> list[Place]:
 
 
 def wolf(heights: Map) -> dict[Place, float]:
-    """Wolf pruning as the standard says it: the least high hill goes, and once more.
-
-    The maxima, each with the height of its hill when it goes; the last, with that above the lowest.
-    """
+    """Wolf pruning as the standard says it: the least high hill goes, and once more."""
     summit = {}  # of the hill of each pixel: the way up from it ends there
     for start in np.ndindex(heights.shape):
         place, above = start, max(around(heights, start), key=heights.item)

@@ -70,14 +70,6 @@ def test_arrays(tmp_path: Path) -> None:
         raw(several, {"height": HEIGHTS, "z": 2 * HEIGHTS})
 
 
-@pytest.mark.parametrize(
-    ("separator", "ending"), [(" ", "\n"), ("\t", "\r\n"), (",", "\n"), (";", ";\n"), (", ", "\n")]
-)
-def test_matrices(tmp_path: Path, separator: str, ending: str) -> None:
-    content = matrix(separator=separator, ending=ending)
-    assert_array_equal(raw(tmp_path / "map.csv", content, pixel=1.0).heights, HEIGHTS)
-
-
 def test_what_gwyddion_writes(tmp_path: Path) -> None:
     head = "# Channel: Height\n# Width: 18.0 µm\n# Height: 21.0 µm\n# Value units: nm\n"
     surface = raw(tmp_path / "map.txt", head + matrix(1e2 * HEIGHTS, "\t"))
@@ -168,13 +160,10 @@ def test_the_only_sheet_with_a_map(tmp_path: Path) -> None:
             raw(path, [sheet, (HEIGHTS > 0).tolist()], pixel=1.0)
         with pytest.raises(cr.InputError, match="comments: found Pixel 0"):
             raw(path, [sheet, [["Pixel", 0.5]]], pixel=1.0)
+    titled = [["Surface map"], [], *HEIGHTS.tolist()]
+    assert_allclose(raw(path, [titled], pixel=1.0).heights, HEIGHTS)
     with pytest.raises(cr.FileError, match=f"found no map {both}"):
         raw(path, [INFORMATION, INFORMATION], pixel=1.0)
-
-
-def test_text_above_the_map_in_a_sheet(tmp_path: Path) -> None:
-    titled = [["Surface map"], [], *HEIGHTS.tolist()]
-    assert_allclose(raw(tmp_path / "a.xlsx", [titled], pixel=1.0).heights, HEIGHTS)
 
 
 HOLED = np.where(X == Y, np.nan, HEIGHTS)
@@ -215,7 +204,6 @@ def test_holes_of_whole_rows_and_columns_remain(tmp_path: Path) -> None:
 #: Contents, in which @ is a matrix, with options, and what is said of them.
 WRONG: list[tuple[str, dict[str, Any], str]] = [
     ("Height [nm]\n@", ONE, r"comments: found Height \[nm\], expected "),
-    ("Made by hand\nX step: 2.0\n\n@", ONE, "comments: found X step: 2.0, expected "),
     ("0.5 1.5 no 2.5\n@", ONE, "columns: found 0.5, 1.5, no, 2.5, expected a column"),
     ("-0,359,-0,042,0,100\n" * 3, ONE, "rows: found up to 6 parts between commas, expected num"),
     (
@@ -228,7 +216,6 @@ WRONG: list[tuple[str, dict[str, Any], str]] = [
     (matrix(np.full((7, 9), np.nan)), ONE | {"fill": True}, "expected some heights"),
     (matrix(np.ones((7, 9))), ONE, "found 1 everywhere, expected a rough surface"),
     (matrix(1e9 * HEIGHTS), ONE, "rms slope .* give height_unit"),
-    (matrix(1e-9 * HEIGHTS), ONE, "rms slope .* give height_unit"),
     (
         "@",
         ONE | {"unit": "nm", "height_unit": "um"},
@@ -236,21 +223,16 @@ WRONG: list[tuple[str, dict[str, Any], str]] = [
     ),
     ("@", {"pixel": (1.0, 1.0, 1.0)}, "found 3 numbers"),
     ("# x y quality\n0,0,1\n1,0,2\n", ONE, "columns: found x, y, quality, expected a column"),
-    ("# row col z\n0,0,1\n1,0,2\n", ONE, "columns: found row, col, z, expected a column"),
     (INDEXED, ONE, "columns: found 4 columns without a header, two of which are coordinates"),
     ("@", {"pixel": (1.0, 30.0)}, "found 1 by 30, expected sides at most 1 to 10"),
     ("@", ONE | {"unit": "parsec"}, "unit: found 'parsec', expected a unit of le"),
     ("@", ONE | {"height_unit": "nm"}, "unit: found none, expected the unit of"),
     ("# Width: 9 µm\n# Height: 7 µm\n@", {"unit": "nm"}, "unit: found nm, expected "),
     ("# Width: 9 µm\n# Height: 7 nm\n@", {}, "units: found µm and nm, expected one"),
-    ("# Width: 9,0 µm\n# Height: 7,0 µm\n@", {"unit": "mm"}, "found mm, expected µm"),
-    ("# Width: 9 by 9 µm\n# Height: 7 µm\n@", {}, "units: found by 9 µm and µm"),
     ("# Height: 7 µm\n@", ONE | {"unit": "mm"}, "comments: found only a hei"),
     ("# Width: 9 m\n# Height: 7 m\n@", {"pixel": 2.0}, "found 2 by 2, expected 1 by"),
     ("@" + matrix([HEIGHTS.mean(axis=0).round(3)]), ONE, "last row: found the means of"),
-    ("# Breite: 9 mm\n# Werte: nm\n@", {}, "comments: found # Breite: 9 mm, exp"),
     ("# z unit: nm\n@", ONE | {"unit": "mm"}, "comments: found # z unit"),
-    ("# Pixel = 0.5\n@", ONE, "comments: found # Pixel = 0.5"),
     ("# Value units: V\n@", ONE | {"unit": "m"}, "height_unit: found 'V'"),
     (matrix().replace("\n", "\nx", 1), ONE, "row 2, column 1: found 'x"),
     (2 * "# Width: 9 m\n# Height: 7 m\n@", {}, "rows: found lines without numbers"),
@@ -261,24 +243,18 @@ WRONG: list[tuple[str, dict[str, Any], str]] = [
     ("x,y,z\n1,1,1\n2,2,2\n1,1,3\n2,1,1\n", {}, "x, y: found the point 1, 1 2 times, exp"),
     ("x,y,z\n1,1,1\n2,2,2\n3.3,1,1\n4,1,1\n", {}, "x: found .*, expected coordinates"),
     ("x,y,z\n0,1,1\n1,2,2\n3,1,1\n3,2,1\n", {}, "x: found 1, expected coordinates 1.5 ap"),
-    ("Heights in nm\nx,y,z\n1,1,1\n2,2,2\n", {}, "comments: found Heights in nm, expected "),
     ("x,y,z\n1,1,1\n1,2,2\n1,3,1\n", {}, "x: found one value or none"),
     ("x [m],y [mm],z\n1,1,1\n1,2,2\n", {}, "units: found m and mm, expected one along x and y"),
     ("x,y,z,valid\n0,0,1,1\n1,0,2,0\n0,1,3,1\n1,1,4,1\n", {}, "columns: found valid, e"),
-    ("x,y,z,gain\n0,0,1,1\n1,0,2,1\n0,1,3,1\n1,1,4,1\n", {}, "columns: found gain, e"),
     ("x,y,z,id\n0,0,1,1\n1,0,2,0\n0,1,3,1\n1,1,4,1\n", {}, "columns: found id, e"),
-    ("x,y,z,ok\n0,0,1,1\n1,0,2,False\n0,1,3,1\n1,1,4,1\n", {}, "columns: found ok, e"),
     ("", {}, "empty"),
     ("x,y,z\n", {}, "rows: found none below the header"),
     ("1 2 3 4\n", ONE, "shape"),
     ("0 1 2 3 4 5 6 7 8\n@", ONE, "row 1: found numbers 0, 1, 2, ..."),
-    ("0 .2 .4 .6 .8 1 1.2 1.4 1.6\n@", ONE, "row 1: found numbers 0, 0.2, 0.4, ..., expected he"),
     ("y\\x .2 .4 .6\n0.0 1 2 1\n0.2 2 5 3\n0.4 1 4 1\n", ONE, "row 1: found numbers 0.2, 0.4, "),
     (NUMBERED, ONE, "column 1: found numbers 0, 1, 2, ..., expected heights alone: leave coord"),
     (THOUSANDS, ONE, "row 1: found 1,003, and 990 in row 11, expected .* thousands"),
-    (THOUSANDS.replace(",", "."), ONE, "found 1.003, and 990 in row 11"),
     (FEW_THOUSANDS, ONE, "row 5: found 1.013, and 827 in row 1, expected .* thousands"),
-    (FEW_THOUSANDS.replace(".", ","), ONE, "row 5: found 1,013, and 827 in row 1"),
     ("x;y;z\n0;0;827\n0;1;9\n1;0;1.000\n1;1;12\n", {}, "row 4: found 1.000, and 827 in row 2"),
     (THOUSANDS.replace("1,0", "1,000,0"), ONE, "row 1: found 1,000,003, expected"),
     (THOUSANDS.replace(",", "'"), ONE, "row 1: found 1'003, expected numbers w"),

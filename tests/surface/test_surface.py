@@ -42,20 +42,6 @@ def test_a_sphere_is_removed_and_said(radius: float) -> None:
     assert_allclose(rough.rms_height, NOISE.std(), rtol=1e-2)
 
 
-def test_another_unit_is_the_same_surface() -> None:
-    cap = np.sqrt(50**2 - X**2 - Y**2) + NOISE
-    scan = cr.surface.Surface(cap, PIXEL, unit="mm").detrend("sphere")
-    metres = scan.to_unit("m")
-    assert_allclose(metres.heights, 1e-3 * scan.heights, rtol=1e-15)
-    assert_allclose(metres.pixel, (0.5e-3, 0.7e-3), rtol=1e-15)
-    one, other = scan.removed[0], metres.removed[0]
-    assert_allclose((other.radius, other.height), (1e-3 * one.radius, 1e-3 * one.height))
-    assert other.slopes == one.slopes
-    assert_allclose(metres.to_unit("um").summits(0.1).tip_radii, 1e3 * scan.summits(0.1).tip_radii)
-    with pytest.raises(cr.InputError, match="unit: found a map without unit, expected units of"):
-        cr.surface.Surface(cap, 1.0).to_unit("m")
-
-
 @pytest.mark.parametrize(
     ("heights", "message"),
     [
@@ -70,8 +56,12 @@ def test_another_unit_is_the_same_surface() -> None:
 def test_no_map(heights: object, message: str) -> None:
     with pytest.raises(cr.InputError, match=message):
         cr.surface.Surface(heights, 1.0)  # type: ignore[arg-type]
-    with pytest.raises(cr.InputError, match="unit: found 'parsec', expected a unit of length"):
-        cr.surface.Surface(NOISE, 1.0, "parsec")
+    wrong = {"unit": "parsec", "filled_pixels": np.zeros((20, 20)), "pixel": np.ones((3, 2))}
+    for name, value in wrong.items():
+        with pytest.raises(cr.InputError, match=f"^{name}: found"):
+            cr.surface.Surface(NOISE, **{"pixel": 1.0, name: value})
+    with pytest.raises(cr.InputError, match=r"^unit: found None"):
+        cr.surface.Surface(NOISE, 1.0, None)  # type: ignore[arg-type]
 
 
 def test_a_paraboloid_of_a_turned_cylinder() -> None:

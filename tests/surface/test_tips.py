@@ -35,11 +35,7 @@ def test_a_paraboloid_is_found_exactly(across: int, scale: float) -> None:
 
 @pytest.mark.parametrize("axes", [0.9, 0.5, 0.1, 0.01])
 def test_the_elliptic_contact_by_quadrature(axes: float) -> None:
-    """Displacements under p0 sqrt(1 - x^2/a^2 - y^2/b^2), from the integrals of the potential.
-
-    With a = 1, b = axes: delta - A x^2 - B y^2 = p0 a b / (2 E*) times the integral over s from 0
-    of (1 - x^2/(1 + s) - y^2/(b^2 + s)) / sqrt((1 + s) (b^2 + s) s)  (Johnson 1985, eq. 3.33).
-    """
+    """Displacements under p0 sqrt(1 - x^2/a^2 - y^2/b^2), from the integrals of the potential."""
     b = axes
 
     def integral(power_a: float, power_b: float) -> float:

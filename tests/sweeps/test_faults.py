@@ -1,7 +1,4 @@
-"""Whatever is killed, and whenever: nothing is half-written, and resuming gives the same table.
-
-One kill in every run of the tests; with --full, 30 of the command and 30 of its workers.
-"""
+"""Whatever is killed, and whenever: nothing is half-written, and resuming gives the same table."""
 
 import logging
 import os
@@ -13,6 +10,7 @@ import sys
 import time
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import psutil
 import pytest
@@ -79,9 +77,7 @@ main(["sweep", "a.toml", "--workers", "1", "--resume"])
 """
 
 
-def test_the_command_is_killed_at_any_moment(
-    request: pytest.FixtureRequest, file: Path, whole: cr.SweepTable
-) -> None:
+def test_the_command_is_killed_at_any_moment(request: Any, file: Path, whole: Any) -> None:
     moments = random.Random(request.config.option.seed)
     known = killed = 0
     while killed < kills(request):
@@ -103,9 +99,7 @@ def test_the_command_is_killed_at_any_moment(
     assert {path.suffix for path in (file / "a-sweep/parts").iterdir()} == {".parquet"}
 
 
-def test_workers_are_killed_at_any_moment(
-    request: pytest.FixtureRequest, file: Path, whole: cr.SweepTable
-) -> None:
+def test_workers_are_killed_at_any_moment(request: Any, file: Path, whole: Any) -> None:
     """Whoever computed dies; where that happens to one batch twice, --resume computes it."""
     chance = random.Random(request.config.option.seed)
     left = kills(request)

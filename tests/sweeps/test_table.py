@@ -2,16 +2,19 @@
 
 import logging
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scene_files import scene_text
-from scenes import MATERIAL, paper
+from scenes import MATERIAL, hexagonal, paper
 from sweep_files import SMALL, numbers, same, sweeping, swept, tables, toml
 
 import convexrough as cr
+from convexrough.sweeps.measures import CYCLE, NORMAL, measured
 
 
 @pytest.fixture(scope="module")
@@ -53,11 +56,8 @@ def test_rows_are_those_of_single_scenes() -> None:
     assert set(rows["status"]) == {"certified"}
     assert set(rows["message"]) == {""}
     for i in (0, 7):  # the first and the last seed
-        asperities = cr.Asperities.hexagonal(
-            spacing=0.0025, tip_radius=0.02, within=0.0102,
-            height_std=rows["asperities.height_std"][i], seed=int(rows["seed"][i]),
-        )  # fmt: skip
-        scene = cr.Scene(1.0, asperities, MATERIAL, 0.5, geometry="summit")
+        rough = hexagonal(height_std=rows["asperities.height_std"][i], seed=int(rows["seed"][i]))
+        scene = replace(rough, friction=0.5)
         contact = cr.press(scene, load=rows["normal.load"][i])
         P, proof = 0.5 * contact.load, contact.certificate
         first, second = cr.cycles(contact, P * np.array([0.37, 0.5]), P * np.array([-0.37, 0.1]))
@@ -67,28 +67,44 @@ def test_rows_are_those_of_single_scenes() -> None:
         closed = cr.steady(scene, loads=loads, forces=forces)
         expected = {
             "contact": (contact.status == "contact").sum(),
-            "open": (contact.status == "open").sum(),
-            "undecided": 0,
-            "load": contact.load,
-            "approach": contact.approach,
-            "load_error": proof.load_error,
+            "open": (contact.status == "open").sum(), "undecided": 0, "load": contact.load,
+            "approach": contact.approach, "load_error": proof.load_error,
             "certificate.convexity_number": proof.convexity_number,
-            "model_error": contact.model_error,
-            "crowding": contact.crowding,
+            "model_error": contact.model_error, "crowding": contact.crowding,
             "displacement_0.2": cr.shear(contact, force=0.2 * P).displacement,
             "displacement_0.5": cr.shear(contact, force=0.5 * P).displacement,
-            "loss_0.37": first.loss,
-            "loss_0.1_0.5": second.loss,
+            "loss_0.37": first.loss, "loss_0.1_0.5": second.loss,
             "loss_normalised_0.37": first.loss_normalised,
             "loss_over_smooth_0.1_0.5": second.loss_normalised / second.smooth_normalised,
             "loss_factor_0.37": first.loss_factor,
             "secant_stiffness_0.1_0.5": second.secant_stiffness,
             "history.loss_2": cr.history(contact, forces=P * np.array([0.5, -0.2, 0.5])).losses[2],
             "steady.loss": closed.loss,
-        }
+        }  # fmt: skip
         for name, value in expected.items():
             rounding = 1e-12 * value if name == "load_error" else 0.0
             assert rows[name][i] == pytest.approx(value, rel=0.0, abs=rounding), name
+
+
+def test_rows_together_are_those_of_scenes_one_by_one() -> None:
+    """Where only numbers of contacts and cycles are asked for, scenes are computed together."""
+    contents = {k: v for k, v in ALL.items() if k not in ("shear", "history", "steady")}
+    contents["cycle"] = {"maximum_fraction": [0.37, 1.0], "minimum_fraction": [-0.37, 0.1]}
+    asked = [f"normal.{each}" for each in NORMAL] + [f"cycle.{each}" for each in CYCLE]
+
+    def measured(*more: str) -> dict[str, Any]:
+        sweep = ALL["sweep"] | {"measure": [*asked, *more]}
+        return swept(contents | {"sweep": sweep}).read()
+
+    together, alone = measured(), measured("crowding")
+    assert set(alone) - set(together) == {"crowding"}
+    for name, values in together.items():
+        if values.dtype.kind == "U":
+            assert values.tolist() == alone[name].tolist()
+        elif "error" in name:
+            assert (values <= 1e3 * alone[name] + 1e-25).all(), name
+        else:
+            np.testing.assert_allclose(values, alone[name], rtol=1e-12, atol=1e-30, err_msg=name)
 
 
 def test_scenes_made_in_python() -> None:
@@ -279,3 +295,14 @@ def test_the_command(command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPat
     status, out, err = command("sweep", "--summary", "a-sweep", "--out", "c")
     assert len(list((tmp_path / "c").glob("*.png"))) == 1
     assert f"not drawn: {len(written) - 3} more figures; cr.open_sweep(DIR).plot(" in out
+
+
+def test_onset_is_the_least_force_at_which_the_fraction_slides() -> None:
+    asperities = cr.Asperities([[0, 0], [1, 0], [0, 1], [-1, -1]], 0.1, [0.0, 2e-4, 3e-4, 5e-4])
+    scene = cr.Scene(np.inf, asperities, cr.Material(1.0, 0.3), friction=0.5)
+    contact = cr.press(scene, approach=1e-3)
+    onsets = np.sort(cr.onset_of_sliding(contact)[contact.loads > 0]) / (0.5 * contact.load)
+    found = measured(contact, {}, ["onset"]).numbers
+    for quarters in range(1, 5):
+        least = onsets[-(-quarters * len(onsets) // 4) - 1]
+        assert_allclose(found["onset", f"{quarters / 4:g}"], least, rtol=1e-12)
