@@ -44,7 +44,7 @@ def elliptic_path(
     phase  : [rad] from -pi to pi; at pi/2 P and Q are in phase, and the ellipse is a straight line
     friction : coefficient of friction f of the scene. The extremes of P, P + Q/f and P - Q/f are
         points of the path, so `Cycle.level` is that of the ellipse
-    chords : approximate number of chords that replace the ellipse. The loss along the chords
+    chords : approximate number of chords that replace the ellipse, at least 6. Their loss
         differs from that along the ellipse by a fraction that falls as 1 / chords^2
 
     Raises InputError if the phase is not from -pi to pi, or if `friction` is not positive.

@@ -59,8 +59,8 @@ class Certificate(Proved):
     duality_gap : [force length] upper bound on the energy of these loads minus that of the
         solution, which has the least energy if the scope is "global". The bound is infinite if
         nothing is proved, or if the energy is not proved convex between the loads and the solution.
-        If the total load is prescribed, the energy is that of changed loads: loads on asperities
-        that cannot touch are set to 0, and the others are scaled to the total
+        If the total load is prescribed, the energy is that of the loads scaled to the total, and
+        the bound is infinite if asperities that cannot touch have loads
     fixed_open : number of asperities that the proof assumes to be open, and then proves to be open
         in the solution that it finds. Where this is not 0 (crowded contacts), nearby solutions in
         which one of these asperities touches are not excluded
@@ -317,13 +317,15 @@ def _screened_energy(
     problem: NormalProblem, loads: Array, indentation: Array, errors: Array
 ) -> float:
     """Bound on sum (3/5) k s^(5/3) + g's + s'A s / 2, the energy of loads s on asperities that
-    cannot touch, with their gaps g; 0 under load control.
+    cannot touch, with their gaps g; infinite if there are such loads under load control.
     """
     screened = loads > 0
     screened[problem.candidates] = False
     which = np.flatnonzero(screened)
-    if len(which) == 0 or problem.load is not None:
+    if len(which) == 0:
         return 0.0
+    if problem.load is not None:  # these loads change the scaling of the others
+        return np.inf
     # Loads that underflow in scaled units count as the smallest positive number.
     s = np.maximum(loads[which] / problem.units.force, checks.SMALLEST)
     modulus, radii = problem.scene.material.contact_modulus, problem.scene.relative_radii[which]

@@ -60,7 +60,8 @@ class Solution(Record):
             raise SolverError(f"loads of shape {loads.shape}, expected ({len(problem)},)")
         if loads.dtype.kind not in "iuf":
             raise SolverError(f"loads of type {loads.dtype}, expected real numbers")
-        residual = problem.residual(loads, approach)
+        known = np.isfinite(loads).all()
+        residual = problem.residual(loads, approach) if known else np.inf
         residual = np.inf if np.isnan(residual) else residual
         return cls(loads, approach, iterations, residual, refine)
 

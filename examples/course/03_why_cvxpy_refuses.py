@@ -4,7 +4,7 @@ r"""
 
 **Claim.** A modelling language does not accept the energy of interacting asperities as convex, and
 indeed the energy is not convex everywhere. An argument with charged shells shows where it is
-convex: up to contact radii 57 % larger than those at which neighbouring discs touch.
+convex: for equal discs, up to radii 57 % larger than those at which neighbouring discs touch.
 
 The load :math:`P_j` of an asperity on an elastic half-space acts on asperity :math:`i` at the
 distance :math:`r_{ij}` as a point force, and displaces it by :math:`A_{ij} P_j` with

@@ -169,7 +169,7 @@ assert all(value == 0 for value in checked)
 # For :math:`0 \le s \le 1` the other weights are never negative, so only :math:`e` remains to be
 # checked. It is concave in :math:`s`, with :math:`e = \tfrac 3 5 - \tfrac S 3` at 0 and
 # :math:`e = \tfrac 5 3 (\tfrac{21}{25} - S)` at 1. So four cones are exact up to :math:`S = 21/25`;
-# contacts whose discs do not overlap have :math:`S \le 2/\pi = 0.64`.
+# contacts between equal discs that do not overlap have :math:`S \le 2/\pi = 0.64`.
 #
 # The program of a whole scene has these cones for every asperity, and one quadratic form. For the
 # scene of Dini and Hills (2009) it finds the 37 asperities that touch. Newton's method, which uses

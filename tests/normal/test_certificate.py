@@ -276,3 +276,17 @@ def test_a_load_too_small_for_own_units_is_not_lost(control: str) -> None:
     assert len(open_ones)
     wrong[open_ones] = 5e-324
     assert_honest(cr.certify(scene, wrong, **given), wrong, exact)
+
+
+def test_the_energy_of_loads_where_nothing_can_touch() -> None:
+    """It is known at a prescribed approach; under a prescribed load it changes the scaling."""
+    scene = paper()
+    contact = cr.press(scene, load=1e-8)
+    far = int(np.argmax(np.hypot(*scene.asperities.positions.T)))
+    assert far not in NormalProblem.assemble(scene, load=1e-8).candidates
+    loads = contact.loads.copy()
+    loads[far] = 1e-3 * loads.max()
+    at_approach = cr.certify(scene, loads, approach=contact.approach)
+    assert 0 < at_approach.duality_gap < np.inf
+    assert cr.certify(scene, loads * (1e-8 / loads.sum()), load=1e-8).duality_gap == np.inf
+    assert cr.certify(scene, contact.loads, load=1e-8).duality_gap < 1e-20
