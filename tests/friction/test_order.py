@@ -2,6 +2,7 @@
 
 from fractions import Fraction
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -139,3 +140,28 @@ def test_order_is_proved_when_asked(monkeypatch: pytest.MonkeyPatch) -> None:
     assert cr.prove_order(asked, most=5) == "proved for one step"
     assert cr.prove_order(asked) == "proved"
     assert loss_error(asked) < 1e-12 * cr.cycle(asked, maximum=0.1 * asked.load).loss
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "approach"),
+    [((1, 0), (0, 2), 4.5e-4), ((1, 0), (0, 3), 4.5e-4), ((1, 0), (0.3, 1.4), 4.5e-4),
+     ((0.6, 0.8), None, 3e-4)],
+    ids=["1:2", "1:3", "oblique", "slanted line"],
+)  # fmt: skip
+def test_order_on_lattices_of_other_shapes(first: Any, second: Any, approach: float) -> None:
+    """Rims are not at right angles to the direction from the middle, and lines have no width."""
+    i, j = (
+        np.meshgrid(np.arange(-40, 41), np.arange(-20, 21)) if second else (np.arange(-250, 251), 0)
+    )
+    places = np.multiply.outer(i, first) + np.multiply.outer(j, second or (0, 0))
+    asperities = cr.Asperities(0.0025 * places.reshape(-1, 2), 0.02)
+    radius = 40.0 if second else 600.0
+    scene = cr.Scene(radius, asperities, cr.Material(1.0, 0.3), friction=0.5, geometry="summit")
+    contact = cr.press(scene, approach=approach)
+    levels = levels_of(contact)
+    assert 0.3 < contact.crowding < 1.3
+    assert np.count_nonzero(contact.loads) > order.SWEPT
+    problem, n = levels.top.problem, len(levels.candidates)
+    c = 1.5 * np.cbrt(levels.top.loads.value) / problem.coefficients
+    bounds = swept_rates(problem.influence, c, 1.0 - problem.influence.apply(c), np.full(n, np.inf))
+    assert (bounds[c > 0] > 0).all()

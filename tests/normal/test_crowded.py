@@ -73,6 +73,22 @@ def test_random_points_are_judged_honestly(
             assert digits > -10 or judged.duality_gap < 1e-9 * 5e-5 * contact.load
 
 
+@pytest.mark.sample(1)
+@pytest.mark.parametrize("seed", range(6))
+def test_random_points_are_proved(seed: int) -> None:
+    """Through a matrix and through a mesh: what used to be undecided is decided."""
+    scene = random_points(seed, 300)
+    for kind in ("dense", "scattered"):
+        contact = cr.press(scene, approach=5e-5, influence=kind)
+        certificate = contact.certificate
+        assert contact.crowding > 1.5
+        assert certificate.scope == "local"
+        assert certificate.all_proved
+        assert certificate.fixed_open == (contact.status == "open").sum()
+        assert certificate.load_error < 1e-6 * contact.loads.max()
+        assert "fixed open" in certificate.meaning
+
+
 def test_a_box_that_fixes_an_asperity_open_holds_no_load_on_it() -> None:
     contact = cr.press(random_points(0, 300), approach=5e-5)
     known = levels_of(contact).top
@@ -219,7 +235,10 @@ def test_eight_thousand_on_a_lattice_have_one_solution() -> None:
 
 
 def test_poor_loads_of_a_prescribed_total_do_not_exclude_another_solution() -> None:
-    """Of a crowded pair far from a bank of asperities either one can touch."""
+    """Of a crowded pair far from a bank of asperities either one can touch.
+
+    The bound on the approach took the displacement of other loads than its weights.
+    """
     sites = np.array(
         [(i + 0.5 * j, j * np.sqrt(3) / 2) for i in range(-4, 5) for j in range(-4, 5)]
     )

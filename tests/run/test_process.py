@@ -22,6 +22,15 @@ def module(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
 
 
+def test_help_imports_nothing_heavy() -> None:
+    heavy = {"pydantic", "matplotlib", "rich", "cvxpy", "scipy.spatial", "scipy.linalg"}
+    loaded = f"print(*({heavy} & set(sys.modules)))"
+    code = f"import sys, convexrough.cli as c; c.main(['--help']); {loaded}"
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert all(name in ran.stdout for name in ("run", "verify", "new", "paper"))
+    assert ran.stdout.splitlines()[-1] == ""
+
+
 def test_exit_status_of_a_process(tmp_path: Path) -> None:
     (tmp_path / "good.toml").write_text(scene_text())
     good = module("run", "good.toml", "--json", "--no-figures", cwd=tmp_path)
@@ -31,6 +40,14 @@ def test_exit_status_of_a_process(tmp_path: Path) -> None:
     assert (bad.returncode, bad.stdout) == (2, "")
     assert "Traceback" not in bad.stderr
     assert sorted(path.name for path in tmp_path.iterdir()) == ["good-results", "good.toml"]
+
+
+def test_a_line_is_completed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("_CONVEXROUGH_COMPLETE", "bash_complete")
+    monkeypatch.setenv("COMP_WORDS", "convexrough run --pr")
+    monkeypatch.setenv("COMP_CWORD", "2")
+    done = module(cwd=tmp_path)
+    assert (done.returncode, done.stdout.split(), done.stderr) == (0, ["plain,--proof"], "")
 
 
 def test_an_interrupt_while_an_object_is_freed(tmp_path: Path) -> None:

@@ -6,14 +6,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from friction_scenes import FRICTION, VECTOR_FRACTIONS, found, lengths, pressed, with_friction
+from friction_scenes import FRICTION, VECTOR_FRACTIONS, found, lengths, pressed
 from numpy.testing import assert_allclose
-from scenes import PAPER_APPROACH, hexagonal
+from scenes import PAPER_APPROACH
 
 import convexrough as cr
 from convexrough import FrictionConic, shear_vector
 from convexrough.solvers.programs import RawAnswer
 from convexrough.vector_shear import cones
+from convexrough.vector_shear.problem import FrictionProblem
 
 
 @pytest.mark.sample(3)
@@ -39,8 +40,21 @@ def test_cones_and_newton_agree(nu: float, fraction: float) -> None:
 
 @cache
 def blunt(tip_radius: float) -> cr.Contact:
-    scene = with_friction(hexagonal(tip_radius=tip_radius), nu=0.5)
+    lattice = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=tip_radius, within=0.0102)
+    scene = cr.Scene(1.0, lattice, cr.Material(1.0, 0.5), FRICTION, geometry="summit")
     return cr.press(scene, approach=PAPER_APPROACH)
+
+
+@pytest.mark.sample(3)
+@pytest.mark.parametrize("fraction", [1e-6, 0.2, 0.5, 0.9])
+@pytest.mark.parametrize("tip_radius", [0.3, 0.5])
+def test_five_cones(tip_radius: float, fraction: float) -> None:
+    contact = blunt(tip_radius)
+    assert 21 / 25 < contact.cached(FrictionProblem).share < 1
+    force = fraction * FRICTION * contact.load
+    newton = shear_vector(contact, force=force)
+    conic = shear_vector(contact, force=force, solver=FrictionConic())
+    assert lengths(newton.forces - conic.forces).max() < 1e-6 * lengths(newton.forces).max()
 
 
 def test_too_dense_for_a_convex_program() -> None:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from friction_scenes import FRICTION, VECTOR_FRACTIONS, VECTOR_NAMES, found, pressed
+from friction_scenes import FRICTION, VECTOR_FRACTIONS, VECTOR_NAMES, found, lengths, pressed
 from numpy.testing import assert_allclose
 
 import convexrough as cr
@@ -55,6 +55,24 @@ def test_the_error_of_the_papers_assumption(
     difference = state.forces - np.column_stack((scalar.forces, 0 * scalar.forces))
     norm = float(np.sqrt((difference**2).sum() / (scalar.forces**2).sum()))
     assert state.disagreement == pytest.approx(norm, rel=1e-9)
+
+
+@pytest.mark.sample(2)
+@pytest.mark.parametrize("nu", [0.3, 0.5])
+@pytest.mark.parametrize("fraction", [0.99, 0.999, 0.9999, 1 - 1e-6, 1 - 1e-9, 1 - 1e-12])
+def test_close_to_gross_sliding(fraction: float, nu: float) -> None:
+    """All slide before Q = f P: then forces only turn, and the displacement grows as 1 / root."""
+    state = found("paper", nu, fraction)
+    assert state.residual < 1e-10
+    if fraction >= 0.9999:
+        assert (lengths(state.slips) > 0).sum() == 37
+        statuses = state.status[state.contact.loads > 0]
+        assert not (statuses == "partial").any()
+        assert (statuses == "sliding").sum() >= 30
+    if fraction == 1 - 1e-9:
+        farther = found("paper", nu, 1 - 1e-11)
+        ratio = farther.displacement[0] / state.displacement[0]
+        assert ratio == pytest.approx(10.0, rel=1e-2)
 
 
 def test_gross_sliding() -> None:
