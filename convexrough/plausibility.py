@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from convexrough.arrays import Array
 from convexrough.contact import Contact, covered, discs_of, mean_pressures
+from convexrough.scene.base import along
 from convexrough.scene.neighbours import crowding
 from convexrough.scene.scene import Scene
 from convexrough.sphere.smooth import SmoothEllipsoid, smooth_reference
@@ -26,6 +27,7 @@ RUBBER, DIAMOND = 1e6, 1.2e12
 FEW = 5  # asperities that touch
 CUT_OFF = 0.7  # `array_extent`: there the pressure of a smooth sphere is 0.7 of the peak
 CUT_RIM = 0.5  # `rim_touching`: not 0, because single tall asperities can touch at the rim
+NEAR_END = 0.9  # part of the array's length within which contact is away from its ends
 HIGH_FRICTION = 2.0  # which only clean metals in vacuum exceed
 INACCURATE = 0.1  # bound on the error of a load, as a fraction of the largest load
 STEEP = 0.2  # ratio of radii at which paraboloid and sphere differ by 1 %
@@ -52,7 +54,7 @@ def limits(
         "covered": covered,
         # largest distance of a point of contact from the axis, divided by the sphere's radius
         "extent": max((float(reach.max(initial=0.0)) for reach in reaches), default=0.0),
-        "array_extent": array_extent(scene, float(loads.sum())),
+        "array_extent": 0.0 if ends(scene, touching) else array_extent(scene, float(loads.sum())),
         "rim_touching": rim_touching(scene, touching),
         "axis_outside": axis_outside(scene),
         "steepness": float((radii / scene.asperities.tip_radii).max()),
@@ -183,8 +185,23 @@ def rim_touching(scene: Scene, touching: NDArray[np.bool_]) -> float:
     return float(touching[scene.asperities.layout.rim].mean()) if is_array(scene) else 0.0
 
 
+def ends(scene: Scene, touching: NDArray[np.bool_]) -> bool:
+    """True for a cylinder whose contact reaches an end of the array along its axis."""
+    flat = np.isinf(along(scene.sphere_radius))
+    if flat.sum() != 1 or not is_array(scene):
+        return False
+    reach = np.abs(scene.asperities.positions[:, flat]).ravel()
+    return bool(reach[touching].max(initial=0.0) > NEAR_END * reach.max() > 0)
+
+
 def at_the_rim(extent: float) -> str:
     """A warning for an `array_extent` below `CUT_OFF`."""
+    if extent == 0:
+        return (
+            "contact reaches the ends of the array along the axis of the cylinder: loads rise "
+            "towards the ends, and the approach depends on the length of the array; judge a long "
+            "cylinder by the middle of a long array"
+        )
     return (
         f"contact reaches the rim of the array, which is at {extent:.3g} of the contact radius of "
         "the smooth sphere: the loads depend on the size of the array; check the unit of the "

@@ -61,7 +61,7 @@ _SCALE = re.compile(
     re.I,
 )
 _CHANGED = re.compile(
-    r"\b(counts|digits|volts?|waves|fringes|inverted|multiplied|divided|(?:nano|mi[ck]ro|milli)met\w+)\b",
+    r"\b(counts|digits|volts?|waves|fringes|inverted|depths?|down|downwards|multiplied|divided|(?:nano|mi[ck]ro|milli)met\w+)\b",
     re.I,
 )
 

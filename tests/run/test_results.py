@@ -141,6 +141,7 @@ def test_an_array_that_ends_inside_the_contact_is_told() -> None:
         (one, 1e3, {"approach": 5e-5}, "asperities in contact: 1, fewer than 5"),
         (wide, 1.0, {"approach": 9e-5}, "100% of the asperities at the rim of the array touch; as"),
         (wide, 1.0, {"approach": 5e-5}, ""),
+        (wide, (np.inf, 1.0), {"approach": 5e-5}, "the ends of the array along the axis of the"),
         (wide, np.inf, {"approach": 1e-6}, ""),
         (wide, 1.0, {"approach": -1e-6}, "no asperity carries a load: check the sign and unit"),
         (few, 1.0, {"approach": 1e-5}, ""),

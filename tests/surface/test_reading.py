@@ -285,6 +285,7 @@ def test_arrays_without_numbers(tmp_path: Path, shape: tuple[int, ...]) -> None:
         *("values in Angstrom", "scale factor 0.001", "dx = 0.5", "lateral resolution 0.5 µm/px"),
         *("ZCal: 0.5", "Gain: 0.5", "heights multiplied by two", "Mult 2", "heights in waves"),
         *("z in counts", "volts", "z * 1000", "Faktor 0,5", "heights x1000", "LSB=0.1", "inverted"),
+        *("Depth (positive down)", "Z axis points down"),
         *("高度: 128.0 微米", "z unit: nm; pixel size 1 um", "in um", "z [um]"),
     ],
 )
