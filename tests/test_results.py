@@ -214,6 +214,7 @@ def test_gradients_have_all_arrays() -> None:
 def test_axes_in_axes_out() -> None:
     for name, result in having("plot").items():
         alone = result.plot()
+        assert alone._repr_png_().startswith(b"\x89PNG")  # as notebooks show it
         assert isinstance(alone, Axes)
         mine, other = Figure().subplots(1, 2)
         assert plots.plot(result, other) is other

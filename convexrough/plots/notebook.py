@@ -76,8 +76,8 @@ class ShownAxes(Axes):
     """Axes whose figure notebooks display, without pyplot."""
 
     def _repr_png_(self) -> bytes:
-        figure = self.get_figure(root=True)
-        assert figure is not None
+        figure = self.get_figure()
+        assert isinstance(figure, MatplotlibFigure)
         return as_png(figure)
 
 
