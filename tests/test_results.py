@@ -21,6 +21,7 @@ import convexrough as cr
 from convexrough import plots, solvers
 from convexrough.compare import compare
 from convexrough.errors import ExtraError, SceneFileError
+from convexrough.plots.notebook import ShownAxes
 from convexrough.record import Record, singular
 
 NEW_SCENE = Path(plots.__file__).parent.parent / "run/new_scene.toml"
@@ -214,12 +215,16 @@ def test_gradients_have_all_arrays() -> None:
 def test_axes_in_axes_out() -> None:
     for name, result in having("plot").items():
         alone = result.plot()
-        assert alone._repr_png_().startswith(b"\x89PNG")  # as notebooks show it
         assert isinstance(alone, Axes)
         mine, other = Figure().subplots(1, 2)
         assert plots.plot(result, other) is other
         assert (mine.has_data(), other.has_data()) == (False, True), name
         assert other.get_xlabel()
+
+
+def test_axes_are_shown_in_notebooks() -> None:
+    axes = Figure().add_subplot(axes_class=ShownAxes)
+    assert axes._repr_png_().startswith(b"\x89PNG")
 
 
 ROOT = Path(cr.__file__).parent
