@@ -190,7 +190,8 @@ def ends(scene: Scene, touching: NDArray[np.bool_]) -> bool:
     flat = np.isinf(along(scene.sphere_radius))
     if flat.sum() != 1 or not is_array(scene):
         return False
-    reach = np.abs(scene.asperities.positions[:, flat]).ravel()
+    place = scene.asperities.positions[:, flat].ravel()
+    reach = np.abs(place - (place.min() + place.max()) / 2)
     return bool(reach[touching].max(initial=0.0) > NEAR_END * reach.max() > 0)
 
 

@@ -55,6 +55,8 @@ class Solution(Record):
 
         Raises SolverError unless there is a real number for each asperity of the problem.
         """
+        if np.ma.is_masked(loads):
+            raise SolverError("loads with masked entries, expected real numbers")
         loads = np.asarray(loads)
         if loads.shape != (len(problem),):
             raise SolverError(f"loads of shape {loads.shape}, expected ({len(problem)},)")
