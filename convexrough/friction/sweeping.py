@@ -33,6 +33,11 @@ T = TypeVar("T")
 Moments = Callable[[NDArray[np.complex128]], list[Array]]
 
 
+def alike(d: NDArray[np.complex128]) -> list[Array]:
+    """No moments: the weights are equal where those of `around` are then 0, as on lattices."""
+    return []
+
+
 def around(d: NDArray[np.complex128]) -> list[Array]:
     """The moments that are 0 where neighbours lie all around; (7) then proves (6) for far ones."""
     return [d.real, d.imag, (d * d).real, (d * d).imag]
@@ -54,14 +59,16 @@ def corner(d: NDArray[np.complex128]) -> list[Array]:
 #: of the neighbours decides what is outward. They are tried until the bound 1 - q_i suffices. A try
 #: also uses the asperities that determined q_i in earlier tries.
 TRIES: tuple[tuple[int, Moments | None, bool], ...] = (
+    (6, alike, False), (8, alike, False),
     (12, around, False), (10, edge, False), (10, edge, True), (14, corner, False),
     (32, around, False), (32, edge, False), (32, edge, True),
     (60, around, False), (60, edge, False), (60, edge, True), *3 * ((60, None, False),),
 )  # fmt: skip
 
 MORE, FEW = 32, 300  # more than MORE neighbours are tried only if at most FEW asperities remain
-ALONE = 14  # neighbours of an asperity outside the contact that are tried, each alone
+ALONE = 6  # neighbours of an asperity outside the contact that are tried, each alone
 NEAR = 9  # where (7) proves (6) far away, (6) is computed for NEAR times as many as have weights
+NEAR_ALIKE = 5  # the same number for equal weights
 SEARCHES = 15  # systems solved for weights; each leaves out earlier neighbours of negative weight
 SAMPLE = 300  # the linear program considers about twice as many asperities
 DIRECTIONS = 256  # directions in which the extent of the support is computed
@@ -92,12 +99,16 @@ def swept_rates(influence: Influence, c: Array, rates: Array, spare: Array) -> A
             for some in threads.chunks(len(left), ROWS):
                 which = left[some]
                 near = np.column_stack((swept.neighbours(which, count), worst[some]))
-                if moments is None:
+                if moments is alike:
+                    weights = swept.equal(which, near, count)
+                elif moments is None:
                     weights = swept.lightest(which, near)
                 else:
                     make = partial(swept.weights, moments, by_near)
                     weights = _in_parts(make, (near.shape[1] + 5) ** 2, which, near)
-                rates[which], failed[some] = swept.rates(which, near, weights, least[which])
+                checked = (NEAR_ALIKE if moments is alike else NEAR) * near.shape[1]
+                found = swept.rates(which, near, weights, least[which], checked)
+                rates[which], failed[some] = found
             todo = ~(rates[left] > least[left])
             left, worst = left[todo], np.column_stack((worst, failed))[todo]
         if not (rates[support] > 0).all():
@@ -227,6 +238,15 @@ class _Swept:
         weights[off > 1e-9] = 0.0
         return weights
 
+    def equal(self, which: Indices, near: Indices, count: int) -> Array:
+        """(m, s) equal weights of the first neighbours, where the moments of `around` are 0."""
+        d = self.places[near[:, :count]] - self.places[which][:, None]
+        size = np.abs(d).max(axis=1)
+        off = np.abs(d.sum(axis=1)) / size + np.abs((d * d).sum(axis=1)) / size**2
+        weights = np.zeros(near.shape)
+        weights[off < 1e-9, :count] = 1.0
+        return weights
+
     def lightest(self, which: Indices, near: Indices) -> Array:
         """(m, s) weights of the neighbours `near` with the least q_i at a sample of asperities."""
         from scipy.optimize import linprog
@@ -244,7 +264,7 @@ class _Swept:
         return weights
 
     def rates(
-        self, which: Indices, near: Indices, weights: Array, least: Array
+        self, which: Indices, near: Indices, weights: Array, least: Array, checked: int
     ) -> tuple[Array, Indices]:
         """(m,) lower bounds 1 - q_i, and the k that determine q_i; -inf where no weights were found
         or where, without (7), near asperities show that the bound is not above `least` (m,).
@@ -253,7 +273,7 @@ class _Swept:
         known = np.flatnonzero(weights.any(axis=1))
         mine, near = which[known], near[known]
         weights = weights[known] / weights[known].sum(axis=1, keepdims=True)
-        seen = self.neighbours(mine, NEAR * near.shape[1])
+        seen = self.neighbours(mine, checked)
         cost = near.shape[1] * seen.shape[1]
         ratios = _in_parts(self._ratios, cost, mine, near, weights, seen)
         rows, smallest = np.arange(len(known)), ratios.argmin(axis=1)
@@ -276,14 +296,20 @@ class _Swept:
         def total(values: NDArray[Any]) -> Array:
             return np.asarray(np.abs((weights * values).sum(axis=1)))
 
-        square = total(apart**2)
-        first = (total(d) + self.lost * total(apart)) * self.extent
+        first, here = (weights * d).sum(axis=1), self.places[which]
+        size, square = np.abs(first), total(apart**2)
+        behind = np.maximum((first.conj() * here).real - self._least_along(first), 0.0)
+        behind += self.lost * total(apart) * self.extent
         third = 3 / 8 * total(apart**2 * d) + 5 / 8 * total(d**3)
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore"):
             rest = total(apart**4 / np.maximum(r[:, None] - apart, 0.0))
-        s = square / 4 - first - 3 / 4 * total(d**2) - (third + rest) / r
-        # Where s > square / 16, s - square / 32 is far larger than the rounding error of s.
-        return np.asarray(np.where(s > square / 16, square / 32 / self.extent**2, 0.0))
+            turned = -(weights * d**2).sum(axis=1) * (first.conj() / size) ** 2
+            across = turned.real * (1.0 - 2.0 * (behind / size / r) ** 2) - np.abs(turned.imag)
+        edge = (turned.real >= 0) & (size * r >= 1.5 * turned.real)
+        second = np.where(edge, np.fmax(across, -np.abs(turned)), -total(d**2))
+        s = square / 4 + 3 / 4 * second - behind - (third + rest) / r
+        # Where s > square / 64, s / 2 is far larger than the rounding error of s.
+        return np.asarray(np.where(s > square / 64, s / 2 / self.extent**2, 0.0))
 
     def _ratios(self, which: Indices, near: Indices, weights: Array, seen: Indices) -> Array:
         """(m, k) sum_j w_j A_jk (with the shell's potential if j = k) over A_ik for k in `seen`."""
@@ -322,11 +348,15 @@ class _Swept:
         apart[i, j] = themselves[both]
         return apart
 
+    @cached_property
+    def _least(self) -> Array:
+        """(DIRECTIONS + 1,) the least Re(conj(p) z) on the support, for directions p all around."""
+        sides = np.exp(-2j * np.pi * np.arange(DIRECTIONS + 1) / DIRECTIONS)
+        return np.array([(side * self.places[self.support]).real.min() for side in sides])
+
     def _least_along(self, directions: NDArray[np.complex128]) -> Array:
         """(...) for each direction p, a lower bound on Re(conj(p) z) of all z on the support."""
-        step = 2 * np.pi / DIRECTIONS
-        around = np.exp(1j * step * np.arange(DIRECTIONS + 1))
-        least = np.array([(side.conj() * self.places[self.support]).real.min() for side in around])
+        step, least = 2 * np.pi / DIRECTIONS, self._least
         angle = np.angle(directions) % (2 * np.pi) / step
         k = np.minimum(angle.astype(int), DIRECTIONS - 1)
         before, after = np.sin(step * np.stack((k + 1 - angle, angle - k)).clip(0.0)) / np.sin(step)

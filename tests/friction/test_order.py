@@ -103,6 +103,32 @@ def test_swept_rates_of_many(seed: int, moved: float) -> None:
         assert (y >= bounds).all()
 
 
+@pytest.mark.sample(5)
+@pytest.mark.parametrize("seed", range(40))
+def test_far_potentials_exceed_their_bound(seed: int) -> None:
+    """(7) holds for random weights on neighbours on one side, at all distances and directions."""
+    random = np.random.default_rng(seed)
+    points = cr.Asperities.hexagonal(spacing=1.0, tip_radius=1.0, within=11.0).positions
+    points = (points + 0.1 * random.normal(size=points.shape)) * [1.0, random.uniform(0.3, 1.0)]
+    points = points[points[:, 0] < random.uniform(-5, 11)]
+    influence, n = DenseInfluence.assemble(points, 1.0), len(points)
+    everyone, far = np.arange(n), random.integers(20, 90)
+    swept = sweeping._Swept(influence, everyone, 0.3 * random.random(n))
+    near, found = swept.neighbours(everyone, 10), 0
+    order = swept.neighbours(everyone, n - 1)
+    for moments, by_near in (sweeping.around, False), (sweeping.edge, False), (sweeping.edge, True):
+        weights = swept.weights(moments, by_near, everyone, near)
+        weights *= random.uniform(0.9, 1.0, weights.shape) ** random.choice([0, 1, 10])
+        weights /= np.maximum(weights.sum(axis=1, keepdims=True), 1e-300)
+        gains = swept.gains(everyone, near, weights, order[:, far])
+        ratios = swept._ratios(everyone, near, weights, order[:, far:])
+        rho = np.abs(swept.places[order[:, far:]] - swept.places[:, None])
+        least = 1.0 + 2.0 * gains[:, None] * (swept.extent / rho) ** 2
+        assert (ratios >= least - 1e-13)[gains > 0].all()
+        found += np.count_nonzero(gains)
+    assert found > 0
+
+
 def test_weights_of_the_linear_program_are_not_negative() -> None:
     """Shells much smaller than distances, for which solvers return some weights below 0."""
     for seed in (5, 7, 9):
