@@ -73,7 +73,7 @@ LATTICE = frozenset(("spacing", "within", "height_std", "tip_radius_cv", "seed")
 
 
 class SummitsTable(FileTable):
-    elsewhere = ("this pattern", LATTICE)
+    elsewhere = ('pattern "file": positions and heights are in the file; delete this key', LATTICE)
     pattern: Literal["file"]
     path: Text
     tip_radius: values.TipRadius | None = None

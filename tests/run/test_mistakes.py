@@ -38,6 +38,8 @@ MISTAKES = [
     (layout("spacing = 1\ntip_radius_cv = 10\nseed = 1"),
      "[asperities] tip_radius_cv: found 10, expected a standard deviation over the mean"),
     (layout('spacing = 1\npath = "a.csv"'), "[asperities] path: not used with this pattern"),
+    (scene_text('pattern = "file"\npath = "a.csv"\nheight_std = 1'),
+     '[asperities] height_std: not used with pattern "file": positions and heights are in the f'),
     (layout("spacing = 1e-9\ntip_radius = 1"), "[asperities] within / spacing = 1.41e+07: found 7"),
     (layout("spacing = 0.0025\ntip_radius = 1", "approach = 0.1", '[solver]\ninfluence = "dense"'),
      "asperities that could touch"),
