@@ -1,7 +1,8 @@
 """`read`: a surface from a file, with all lengths in one unit; and maps in text files.
 
 Text holds a matrix of heights, or columns x, y and height. Comments above a matrix may state the
-width and height of the map (its sizes along x and y) with a unit, and the unit of the values.
+width and height of the map (its sizes along x and y) with a unit, and the unit of the values. The
+header of an ESRI grid states the size of a pixel, the mark of holes, and that y falls row by row.
 """
 
 from __future__ import annotations
@@ -51,7 +52,11 @@ SAME = 1e-6
 
 #: A line such as "# Width: 50.0 µm", as Gwyddion writes above a matrix.
 _SAID = re.compile(r"[#%;\s]*(width|height|value units?)\s*[:=]\s*(.*?)\s*", re.I)
-_COMMENT = re.compile(f"{COMMENT.pattern}|{_SAID.pattern}", re.I)
+#: A line of the header of an ESRI grid, such as "cellsize 0.5".
+_ESRI = re.compile(
+    r"(ncols|nrows|[xy]llc\w+|cellsize|nodata_value)\s+(-?\d+\.?\d*(?:e[+-]?\d+)?)$", re.I
+)
+_COMMENT = re.compile(f"{COMMENT.pattern}|{_SAID.pattern}|{_ESRI.pattern}", re.I)
 _LENGTH = re.compile(r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(.*)")
 
 #: Words that announce a scale, with a number; and words that announce one also without a number.
@@ -92,9 +97,9 @@ def read(
     An .npz or .mat file contains `heights`. It may also contain `unit`, `height_unit`, `pixel`, and
     coordinates x and y: either x of each column and y of each row, or x and y of each height. Other
     numbers that could change the meaning of the heights are an error. Text contains a matrix,
-    possibly with the comments on its size that Gwyddion writes. A matrix with three columns is a
-    list of x, y and height on a grid. Formats of instruments need the package SurfaceTopography
-    (the extra `surface`).
+    possibly with the comments on its size that Gwyddion writes, or the header of an ESRI grid. A
+    matrix with three columns and without such a header is a list of x, y and height on a grid.
+    Formats of instruments need the package SurfaceTopography (the extra `surface`).
 
     Raises FileError if the file cannot be read, or if SurfaceTopography is needed but not
     installed; InputError if the file contains no usable map.
@@ -178,13 +183,15 @@ def _unfilled(heights: Array, fill: bool) -> tuple[Array, NDArray[np.bool_] | No
 
 
 def text_map(path: Path) -> HeightGrid:
-    """The map in a text file: x, y and height if it has three columns or names; else a matrix."""
+    """The map in a text file: x, y and height if it has names or three columns, or a matrix."""
     known = ("x", "y", "height", *COLUMNS["height"].also)
     table = read_text_table(path, known, _COMMENT, is_map=True)
     width = len(table.rows[0].cells) if table.rows else 0
-    read = _matrix if table.header is None and width != 3 else _list
+    is_matrix = width != 3 or any(map(_ESRI.match, table.comments))
+    read = _matrix if table.header is None and is_matrix else _list
     header = table.header.text.strip() if table.header else ""
-    unread = [each for each in table.comments if not _SAID.fullmatch(each)]
+    used = (_SAID, _ESRI) if read is _matrix else (_SAID,)
+    unread = [each for each in table.comments if not any(it.fullmatch(each) for it in used)]
     unread = [each for each in unread if each.strip("#%; ") and each.lstrip("#% ") != header]
     return read(path, table, width)._replace(comments=tuple(unread), sheet=table.style.sheet)
 
@@ -228,6 +235,15 @@ def _matrix(path: Path, table: TextTable, width: int) -> HeightGrid:
     said = {}
     for match in filter(None, map(_SAID.fullmatch, table.comments)):
         said[match[1].lower().rstrip("s")] = match[2]
+    if pairs := [line.groups() for line in map(_ESRI.match, table.comments) if line]:
+        esri = {name.lower(): float(value) for name, value in pairs}
+        shape, once = (esri.get("nrows"), esri.get("ncols")), len(esri) == len(pairs)
+        if said or shape != heights.shape or "cellsize" not in esri or not once:
+            found = ", ".join([*said, *map(" ".join, pairs)])
+            expected = "nrows {} and ncols {}, a cellsize, each once".format(*heights.shape)
+            raise InputError("header", found=found, expected=expected)
+        holed = np.where(heights == esri.get("nodata_value"), np.nan, heights)
+        return HeightGrid(holed[::-1], (esri["cellsize"],) * 2)  # from the top down
     sizes = [_LENGTH.fullmatch(said.get(name, "")) for name in ("width", "height")]
     value_unit = said.get("value unit", "")
     if sizes == [None, None]:

@@ -21,8 +21,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from convexrough.arrays import Array
-from convexrough.errors import FileError
+from convexrough.errors import FileError, InputError
 from convexrough.tabular.arrays import foreign, needed
+from convexrough.tabular.roles import shortened
 from convexrough.tabular.units import bare, parsed, unit
 
 #: Largest number of characters of a line, and of a number.
@@ -249,9 +250,13 @@ def _headed(
     )
     filled = sum(map(bool, map(str.strip, headers[place])))  # rows of a sheet have empty cells, too
     if is_map and 0 < width != filled and wanted(headers[place]) < 2:
-        numbers = [[style.number(cell) is not None for cell in row.cells] for row in rows[:first]]
-        if all(2 * sum(found) < len(found) for found in numbers):  # else a damaged row
-            return _headed(rows[first:], titles, style, known, is_map)
+        for row in rows[:first]:
+            if 2 * sum(style.number(cell) is not None for cell in row.cells) >= len(row.cells):
+                there = f"row {rows[first].number}"
+                expected = f"{width} heights, as in {there}, or text; or delete the lines above "
+                expected += f"{there} and give --pixel, --unit and --height-unit"
+                raise InputError(f"row {row.number}", found=shortened(row.text), expected=expected)
+        return _headed(rows[first:], titles, style, known, is_map)
     line, names, rows = rows[place], headers[place], rows[place + 1 :]
     if style.separator == " " and rows:
         first = first - place - 1 if width else 0

@@ -201,10 +201,21 @@ def test_holes_of_whole_rows_and_columns_remain(tmp_path: Path) -> None:
                     assert found.filled == (cells == mark).sum()
 
 
+#: The header of an ESRI grid, with a matrix; and one that is not understood.
+ESRI = "ncols 9\nnrows 7\nxllcorner -3.0\nYLLCENTER 1e3\ncellsize 2.5\nNODATA_value 0\n@"
+KEYENCE = '"Model","VK"\n"XY calibration","276","nm"\n"Horizontal","9"\n\n"Height"\n'
+
 #: Contents, in which @ is a matrix, with options, and what is said of them.
 WRONG: list[tuple[str, dict[str, Any], str]] = [
     ("Height [nm]\n@", ONE, r"comments: found Height \[nm\], expected "),
-    ("0.5 1.5 no 2.5\n@", ONE, "columns: found 0.5, 1.5, no, 2.5, expected a column"),
+    ("0.5 1.5 no 2.5\n@", ONE, "row 1: found 0.5 1.5 no 2.5, expected 9 heights, as in row 2, or"),
+    (f"{KEYENCE}{matrix(separator=',')}", ONE, 'row 3: found "Horizontal","9", .*delete the lines'),
+    ("dx 0.5\nNODATA_value -9999\n@", ONE, "row 1: found dx 0.5, .* give --pixel, --unit"),
+    (ESRI.replace("7", "8"), {}, "header: found ncols 9, nrows 8, .*expected nrows 7 and ncols 9"),
+    (ESRI.replace("cellsize 2.5\n", ""), ONE, "header: .*, a cellsize, each once"),
+    (f"cellsize 2\n{ESRI}", {}, "header: found cellsize 2, .*, cellsize 2.5, .* each once"),
+    (f"# Width: 9 m\n# Height: 7 m\n{ESRI}", {}, "header: found width, height, ncols"),
+    (ESRI, {"pixel": 2.0}, "pixel: found 2 by 2, expected 2.5 by 2.5, as the file states"),
     ("-0,359,-0,042,0,100\n" * 3, ONE, "rows: found up to 6 parts between commas, expected num"),
     (
         "% x y z in mm\n0 0 1\n1 0 2\n0 1 1\n1 1 1\n",
@@ -269,6 +280,19 @@ def test_wrong_files(tmp_path: Path, content: str, options: Any, message: str) -
     with pytest.raises(cr.ConvexroughError, match=message) as caught:
         cr.surface.read(path, **options)
     assert all(line.count(str(path)) == 1 for line in str(caught.value).splitlines())
+
+
+@pytest.mark.parametrize("width", [9, 3])  # three columns without a header are a list
+def test_an_esri_grid(tmp_path: Path, width: int) -> None:
+    """Its first row is that of the largest y; the mark of holes can be any number."""
+    heights = np.where(X == 2 * Y, 0.0, HEIGHTS)[:, :width]
+    content = ESRI.replace("9", str(width)).replace("@", matrix(heights))
+    surface = raw(tmp_path / "map.asc", content, unit="m", fill=True)
+    assert (surface.pixel, surface.comments) == ((2.5, 2.5), ())
+    assert_array_equal(surface.filled_pixels, (heights == 0)[::-1])
+    assert_array_equal(surface.heights[3, :2], heights[3, :2])
+    listed = raw(tmp_path / "a.txt", "nrows 3\nx,y,z\n0,0,1\n1,1,3\n2,2,2\n", fill=True)
+    assert listed.comments == ("nrows 3",)
 
 
 @pytest.mark.parametrize("shape", [(0, 5), (5, 0), (0,)])
