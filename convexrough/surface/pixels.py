@@ -151,6 +151,18 @@ def repeated(heights: Array) -> int:
     return int(np.count_nonzero(heights == values[most]))
 
 
+def step(heights: Array) -> float:
+    """[length] the distance of the values that heights take, as of grey levels, or 0: in a sample,
+    each value occurs ten times on average, and nine in ten differences are about multiples of it.
+    """
+    sample = heights.ravel()[:: 1 + heights.size // SAMPLE]
+    apart = np.diff(np.unique(sample))
+    if not 0 < 10 * len(apart) < len(sample):
+        return 0.0
+    size = float(np.median(apart))
+    return size if np.mean(np.abs(apart / size - np.rint(apart / size)) <= 0.1) >= 0.9 else 0.0
+
+
 def copied(heights: Array) -> float:
     """The fraction of rows, not flat, that equal the row before; or that of columns if larger."""
 

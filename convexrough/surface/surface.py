@@ -37,6 +37,10 @@ FLAT, STEEP = 3e-4, 1.0
 #: profile.
 MANY_COPIED = 0.25
 
+#: A warning is given if heights have a step larger than this part of their rms second difference.
+#: At this value a tenth of the maxima of a self-affine surface are lost.
+COARSE = 0.5
+
 #: Differences of heights below this part of the largest height are rounding errors.
 ROUNDING = 64 * np.finfo(float).eps
 
@@ -54,10 +58,11 @@ class Surface(Record, Plottable):
     repeated : number of pixels with the most frequent height if they are surprisingly many and this
         is not the largest height, else 0
     copied  : fraction of rows that equal the row before, or the same of columns if that is larger
+    step    : [length] distance of the values that the heights take, as of grey levels; else 0
     source  : the file, or a description
     comments : comments of the file that were not used
 
-    By default `clipped`, `repeated` and `copied` are determined from `heights`.
+    By default `clipped`, `repeated`, `copied` and `step` are determined from `heights`.
 
     Raises InputError for maps that are constant or have holes, for pixels with one side more than
     ten times the other, and for a unit that is neither "" nor a unit of length such as "mm" or
@@ -78,6 +83,7 @@ class Surface(Record, Plottable):
     clipped: int
     repeated: int
     copied: float
+    step: float
 
     def __init__(
         self,
@@ -91,6 +97,7 @@ class Surface(Record, Plottable):
         clipped: int | None = None,
         repeated: int | None = None,
         copied: float | None = None,
+        step: float | None = None,
     ) -> None:
         grid, size = _checked(heights), checked_pixel(pixel)
         if not isinstance(unit, str):
@@ -115,6 +122,7 @@ class Surface(Record, Plottable):
             clipped=pixels.clipped(known) if clipped is None else clipped,
             repeated=pixels.repeated(known) if repeated is None else repeated,
             copied=pixels.copied(measured) if copied is None else copied,
+            step=pixels.step(known) if step is None else step,
         )
 
     @property
@@ -211,6 +219,12 @@ class Surface(Record, Plottable):
                 f"{self.copied:.0%} of the rows or columns equal the one before: the map seems to "
                 "be enlarged by repeating pixels, and tip radii are wrong; use the map as measured"
             )
+        if self.step > COARSE * np.sqrt(self.moments.m4) * self.pixel[0] * self.pixel[1]:
+            step = f"{self.step:.4g} {self.unit}".rstrip()
+            yield (
+                f"heights are quantised, in steps of {step}: summits on plateaus and tip radii are "
+                "wrong; use finer heights, or try fit=5, or --fit 5"
+            )
         if not FLAT <= self.rms_slope <= STEEP:
             rare = f"steeper than {STEEP:g}" if self.rms_slope > STEEP else f"flatter than {FLAT:g}"
             yield (
@@ -261,8 +275,9 @@ class Surface(Record, Plottable):
         scale = own.into(into)
         removed = tuple(each.scaled(scale) for each in self.removed)
         dx, dy = self.pixel
-        heights, pixel = self.heights * scale, (dx * scale, dy * scale)
-        return replace(self, heights=heights, pixel=pixel, unit=into.name, removed=removed)
+        sizes: Any = {"heights": self.heights * scale, "step": self.step * scale}
+        sizes["pixel"] = dx * scale, dy * scale
+        return replace(self, **sizes, unit=into.name, removed=removed)
 
     @property
     def checksum(self) -> int:

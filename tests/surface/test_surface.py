@@ -161,6 +161,16 @@ def test_spikes_and_drop_outs_are_named() -> None:
     few.flat[::500] = 0.0
     assert cr.surface.Surface(few, 1.0).repeated == 33
     assert cr.surface.Surface(np.round(made, 1), 1.0).repeated == 0  # few levels, as of images
+    for levels, warned in ((40, True), (100, True), (250, False)):  # as of 8 bits, or fewer
+        step = np.ptp(made) / levels
+        few = np.where(made < np.quantile(made, 0.01), np.nan, np.rint(made / step) * step)
+        holed = cr.surface.Surface(filled(few), 10.0, "µm", filled_pixels=np.isnan(few))
+        assert_allclose(holed.step, step, rtol=1e-9)
+        said = f"heights are quantised, in steps of {1e3 * step:.4g} nm: "
+        assert (said in str(holed.detrend().to_unit("nm").warnings)) == warned
+    y, x = np.mgrid[-40:41, -40:41]
+    smooth = (made, np.tile(made[0], (50, 1)), -0.01 * (x**2 + y**2), np.sqrt(1e4 - x**2 - y**2))
+    assert [cr.surface.Surface(heights, 10.0).step for heights in smooth] == [0, 0, 0, 0]
     for enlarged in (np.kron(made, np.ones((2, 1))), made[:, np.arange(150) * 2 // 3]):
         (said,) = cr.surface.Surface(enlarged, 10.0).detrend("plane").warnings
         assert "of the rows or columns equal the one before: the map seems to be enlarged" in said
