@@ -98,8 +98,9 @@ def surface_summary(scanned: Scanned) -> dict[str, Any]:
             "shape": list(origin.shape),
             "pixel": list(surface.pixel),
             "unit": surface.unit,
+            "level": origin.level,
             "removed": [asdict(it) | _named(it, "curvature", "radius") for it in surface.removed],
-            **_named(surface, "filled", "max_height", "rms_height", "rms_slope"),
+            **_named(surface, "filled", "step", "max_height", "rms_height", "rms_slope"),
         },
         "summits": {
             "count": len(summits),
@@ -159,7 +160,8 @@ def describe_surface(scanned: Scanned) -> list[str]:
         ("surface", surface.source),
         *_not_used(surface.comments),
         ("pixels", f"{columns:,} by {rows:,}, each {dx:.6g} by {dy:.6g}{unit}"),
-        ("removed", "; ".join(map(str, surface.removed)) or "nothing"),
+        ("removed", "; ".join(map(str, surface.removed))
+                    or f"nothing; the mean height is {origin.level:.6g}{unit}"),
         *_pressed_by(scanned),
         *((("holes filled", f"{surface.filled:,}"),) if surface.filled else ()),
         ("heights", f"Sz {surface.max_height:.4g}{unit}, Sq {surface.rms_height:.4g}{unit}, "
@@ -183,7 +185,8 @@ def describe_surface(scanned: Scanned) -> list[str]:
         table.append([named, *(getattr(each, name) for each in found)])
     described = [*labelled(lines), "", *aligned(table, left=1, digits=4)]
     if scanned.curve is not None:
-        described += ["", *_describe_curve(scanned.curve, surface.unit)]
+        force = scanned.contact.scene.units.force if scanned.contact is not None else ""
+        described += ["", *_describe_curve(scanned.curve, surface.unit, force)]
     if scanned.contact is not None:
         described += [*_describe_crowded(scanned.contact)]
     if scanned.whole is not None:
@@ -238,7 +241,7 @@ def _radii(radii: tuple[float, float]) -> str:
     return first if first == second else f"[{first}, {second}]"
 
 
-def _describe_curve(curve: Provability, unit: str) -> list[str]:
+def _describe_curve(curve: Provability, unit: str, force: str) -> list[str]:
     height = f"height [{unit}]" if unit else "height"
     table = [["pruning", height, "summits", "contacts", "undecided", "proof", "crowding",
               "model error", "assumptions"]]  # fmt: skip
@@ -257,7 +260,12 @@ def _describe_curve(curve: Provability, unit: str) -> list[str]:
     ]
     if not curve.contacts.any():
         said = [("assumptions", "not tested, because nothing touches")]
-    return [*aligned(table), "", *labelled(said)]
+    least, most = (each.reduce(curve.approaches) for each in (np.fmin, np.fmax))
+    load = f"load {np.fmax.reduce(curve.loads):.6g} {force}".rstrip() + ", "
+    span = f"{least:.6g}" + (f" to {most:.6g}" if most > least else "")
+    at = (load if most > least else "") + "approach of the pressing body from height 0: "
+    at += f"{span} {unit}".rstrip()
+    return [*labelled([("pressed at", at)]), *aligned(table), "", *labelled(said)]
 
 
 def _describe_crowded(contact: Contact) -> Iterator[str]:
@@ -313,6 +321,9 @@ def warnings_about(scanned: Scanned) -> Iterator[str]:
                 f"{name.replace('_', ' ')} of all maxima is {counted / expected:.2f} times that of "
                 "a Gaussian surface with the same spectral moments"
             )
+    if abs(level := summits.origin.level) > surface.max_height:
+        mean = f"the mean height is {level:.6g} {surface.unit}".rstrip()
+        yield f"{mean}: approaches are measured from height 0; --detrend plane subtracts the mean"
     yield from _near_holes(scanned)
     if scanned.curve is None:
         return

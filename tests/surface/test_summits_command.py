@@ -239,8 +239,27 @@ def test_a_map_in_micrometres_called_millimetres(find: Any, surface: cr.surface.
 @pytest.mark.usefixtures("surface")
 def test_where_nothing_touches_nothing_is_to_be_trusted(find: Any) -> None:
     outcome = find("scan.npz", "--radius", "1e4", "--approach", "-100")
+    place = "pressed at        approach of the pressing body from height 0: -100 µm\npruning"
+    assert place in outcome.out
     assert "warning: at a pruning of 0.05 nothing touches, so the model is not" in outcome.err
     assert "assumptions       not tested, because nothing touches" in outcome.out
+
+
+def test_heights_far_from_zero(find: Any, surface: cr.surface.Surface) -> None:
+    """The contact is that of the shifted map; only the approach is shifted, which is said."""
+    found = []
+    for offset, warned in ((0, False), (5000, True)):
+        np.savez("scan.npz", heights=surface.heights + offset, pixel=1.0, unit="µm")
+        ran = find("scan.npz", "--scene", "scene.toml", "--detrend", "none")
+        assert ("the mean height is 5000 µm: approaches are measured from" in ran.err) == warned
+        assert ("removed           nothing; the mean height is 5000 µm" in ran.out) == warned
+        curve = rows("scan-summits/provability.csv")
+        approaches = np.array([float(row["approach"]) for row in curve])
+        span = f"{approaches.min():.6g} to {approaches.max():.6g} µm\n"
+        assert f"load 100, approach of the pressing body from height 0: {span}" in ran.out
+        found.append((approaches + offset, [row["contacts"] for row in curve]))
+    assert found[0][1] == found[1][1]
+    assert_allclose(found[0][0], found[1][0], rtol=1e-9)
 
 
 @pytest.mark.parametrize(
