@@ -123,9 +123,10 @@ class Contacts(Table):
     def warnings(self) -> tuple[str, ...]:
         """The warnings: a line for each kind (its text without numbers), with the first scene."""
         kinds = dict[str, list[str]]()
-        for k, (scene, loads) in enumerate(zip(self.scenes, self.asperity_loads, strict=True)):
+        pressed_to = zip(self.scenes, self.asperity_loads, self.approaches.tolist(), strict=True)
+        for k, known in enumerate(pressed_to):
             pressed = "undecided" in self.status[k]
-            for line in self[k].warnings if pressed else cautions_about(scene, loads):
+            for line in self[k].warnings if pressed else cautions_about(*known):
                 kinds.setdefault(re.sub(r"\d\S*", "", line), []).append(f"scenes[{k}]: {line}")
         return tuple(
             lines[0].replace("]", f"], the first of {len(lines):,}" if lines[1:] else "]", 1)

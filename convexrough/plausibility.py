@@ -35,12 +35,12 @@ STEEP = 0.2  # ratio of radii at which paraboloid and sphere differ by 1 %
 
 def limits_of(contact: Contact) -> dict[str, Any]:
     """The measures of `limits` for a contact."""
-    areas = contact.crowding, contact.covered
-    return limits(contact.scene, contact.loads, contact.contact_radii, *areas)
+    known = contact.contact_radii, contact.crowding, contact.covered, contact.approach
+    return limits(contact.scene, contact.loads, *known)
 
 
 def limits(
-    scene: Scene, loads: Array, radii: Array, crowding: float, covered: int
+    scene: Scene, loads: Array, radii: Array, crowding: float, covered: int, approach: float
 ) -> dict[str, Any]:
     """Measures of the validity of the model, by name, for loads and contact radii (n,)."""
     touching, hardness, pressures = loads > 0, scene.material.hardness, mean_pressures(loads, radii)
@@ -49,13 +49,13 @@ def limits(
         for R, axes in scene.curved
     )
     return {
-        "contact": int(touching.sum()),
+        "loaded": int(touching.sum()),
         "crowding": crowding,  # as in `Contact`, also the next
         "covered": covered,
         # largest distance of a point of contact from the axis, divided by the sphere's radius
         "extent": max((float(reach.max(initial=0.0)) for reach in reaches), default=0.0),
         "array_extent": 0.0 if ends(scene, touching) else array_extent(scene, float(loads.sum())),
-        "rim_touching": rim_touching(scene, touching),
+        "rim_touching": rim_touching(scene, touching, approach),
         "axis_outside": axis_outside(scene),
         "steepness": float((radii / scene.asperities.tip_radii).max()),
         "mean_pressure": float(pressures.max()),  # [force / length^2]
@@ -108,11 +108,11 @@ def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
             f"the coefficient of friction is {normal['friction']:g}: few pairs of bodies exceed "
             f"{HIGH_FRICTION:g}; it is a ratio, not in per cent"
         )
-    if normal["contact"] == 0:
+    if normal["loaded"] == 0:
         yield "no asperity carries a load: check the sign and unit of the approach"
-    elif normal["contact"] < FEW:
+    elif normal["loaded"] < FEW:
         yield (
-            f"asperities in contact: {normal['contact']}, fewer than {FEW}: too few for a rough "
+            f"asperities in contact: {normal['loaded']}, fewer than {FEW}: too few for a rough "
             "surface; check the units of the spacing, the heights and the approach or load"
         )
     if normal["extent"] > STEEP:
@@ -125,7 +125,7 @@ def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
             "the axis of the sphere, at x = 0 and y = 0, is at the edge of the asperities or "
             "outside: shift their positions if these are measured from another point"
         )
-    cut_off = normal["contact"] >= FEW and normal["array_extent"] is not None
+    cut_off = normal["loaded"] >= FEW and normal["array_extent"] is not None
     if cut_off and normal["array_extent"] < CUT_OFF:
         yield at_the_rim(normal["array_extent"])
     elif cut_off and normal["rim_touching"] > CUT_RIM:
@@ -154,16 +154,17 @@ def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
         yield (
             f"mean pressure up to {normal['mean_pressure']:.4g}{named} exceeds the hardness "
             f"{normal['hardness']:.4g}{named} on {normal['beyond_hardness']} of "
-            f"{normal['contact']} asperities: they would yield"
+            f"{normal['loaded']} asperities: they would yield"
         )
 
 
-def cautions_about(scene: Scene, loads: Array) -> list[str]:
-    """The warnings of `cautions` for loads (n,) [force]."""
+def cautions_about(scene: Scene, loads: Array, approach: float) -> list[str]:
+    """The warnings of `cautions` for loads (n,) [force] at an approach [length]."""
     radii = discs_of(scene, loads)
     apart = scene.lattice is not None and 2 * radii.max() < 0.99 * scene.lattice.spacing
     near = 0.0 if apart else crowding(scene.contact_points, radii)
-    return [*cautions(limits(scene, loads, radii, near, covered(scene, radii)), scene.units)]
+    found = limits(scene, loads, radii, near, covered(scene, radii), approach)
+    return [*cautions(found, scene.units)]
 
 
 def is_array(scene: Scene) -> bool:
@@ -180,9 +181,14 @@ def axis_outside(scene: Scene) -> bool:
     return any(bool(outside[axes].any()) for _, axes in scene.curved)
 
 
-def rim_touching(scene: Scene, touching: NDArray[np.bool_]) -> float:
-    """Fraction that touches of the rim (the farthest in each of 16 sectors); 0 without an array."""
-    return float(touching[scene.asperities.layout.rim].mean()) if is_array(scene) else 0.0
+def rim_touching(scene: Scene, touching: NDArray[np.bool_], approach: float) -> float:
+    """Fraction that touches of the rim (the farthest in each of 16 sectors); 0 without an array, or
+    if no asperity of the same pattern beyond the rim could touch.
+    """
+    layout = scene.asperities.layout
+    if not is_array(scene) or scene.reach(approach) <= layout.filled * (1 + 1e-9):
+        return 0.0
+    return float(touching[layout.rim].mean())
 
 
 def ends(scene: Scene, touching: NDArray[np.bool_]) -> bool:

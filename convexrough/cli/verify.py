@@ -176,7 +176,8 @@ def verify(
     for hint in (hint for claim in claims for hint in claim.hints()):
         common.say_aside("hint", hint)
     found = of_loads.solution
-    for caution in cautions_about(file.scene, claimed if found is None else found.loads):
+    pressed = claimed if found is None else found.loads
+    for caution in cautions_about(file.scene, pressed, of_loads.certificate.approach):
         common.say_aside("warning", caution)
     status = common.DONE
     if not all(claim.holds for claim in claims):

@@ -29,13 +29,17 @@ MADE_SITE_ERROR = 16 * 2.0**-53
 HEXAGONAL, SQUARE = (0.5, float(np.sqrt(0.75))), (0.0, 1.0)
 
 
-def sites_within(second: tuple[float, float], limit: float) -> tuple[NDArray[np.int32], Indices]:
-    """(n, 2) the sites (i, j) with |i b1 + j b2|^2 up to `limit`, and (n,) indices that sort them.
+def sites_within(
+    second: tuple[float, float], limit: float
+) -> tuple[NDArray[np.int32], Indices, float]:
+    """(n, 2) the sites (i, j) with |i b1 + j b2|^2 up to `limit`; (n,) indices that sort them; and
+    a bound below which no other site has this square.
 
     The sites are ordered by distance and then by angle; the indices sort them by i and then by j.
     """
     skew = round(2.0 * second[0])  # |i b1 + j b2|^2 = i^2 + skew i j + j^2
-    top = int(np.sqrt(limit / (1.0 - skew**2 / 4.0))) + 1
+    least = 1.0 - skew**2 / 4.0  # |i b1 + j b2|^2 is at least this times i^2, and times j^2
+    top = int(np.sqrt(limit / least)) + 2
     steps = np.arange(-top, top + 1)
     norms = np.add.outer(steps * steps, steps * steps)
     if skew:
@@ -46,7 +50,8 @@ def sites_within(second: tuple[float, float], limit: float) -> tuple[NDArray[np.
     order = np.argsort(norms[taken] + turns)  # turns are below 1, the least difference of two norms
     back = np.empty_like(order)
     back[order] = np.arange(len(order))
-    return np.stack((i[order], j[order]), axis=1).astype(np.int32), back
+    others = min(float(norms[~taken].min()), least * (top + 1) ** 2)
+    return np.stack((i[order], j[order]), axis=1).astype(np.int32), back, others
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +61,7 @@ class Layout(Cached):
     points: Array
     #: The lattice on which the points were made, and (n, 2) their sites; None for other points.
     made: tuple[Lattice, Sites] | None = None
+    filled: float = 0.0  # [length] all sites of `made` nearer to the axis than this are points
 
     def __post_init__(self) -> None:
         if self.made is None and (len(self.points) <= MANY or self.lattice is None):
@@ -64,14 +70,14 @@ class Layout(Cached):
     @classmethod
     def of(cls, second: tuple[float, float], spacing: float, limit: float) -> Layout:
         """The layout of `sites_within` this limit, for a spacing [length]."""
-        sites, order = sites_within(second, limit)
+        sites, order, others = sites_within(second, limit)
         i, j = sites.T
         points = frozen(spacing * np.stack((i + second[0] * j, second[1] * j), axis=1))
         if len(points) < 3:
             return cls(points)
         site_error = MADE_SITE_ERROR * float(np.abs(points).max())
         lattice = Lattice(np.zeros(2), spacing * np.array([[1.0, 0.0], second]), site_error)
-        layout = cls(points, (lattice, sites))
+        layout = cls(points, (lattice, sites), spacing * np.sqrt(others))
         layout.__dict__["order"] = order
         return layout
 

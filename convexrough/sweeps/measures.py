@@ -226,6 +226,7 @@ def _known(
     found = {}
     for k in np.flatnonzero(good).tolist():
         numbers = {name: float(each[k]) for name, each in values.items()}
-        warned = "; ".join(cautions_about(scenes[k], contacts["asperity_loads"][k]))
+        pressed = contacts["asperity_loads"][k], float(contacts["approaches"][k])
+        warned = "; ".join(cautions_about(scenes[k], *pressed))
         found[k] = Measured(numbers, "", warned)
     return found

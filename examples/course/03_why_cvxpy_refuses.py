@@ -33,7 +33,8 @@ plt.rcParams["font.size"] = 14  # readable from the last row
 
 Array = NDArray[np.float64]
 
-asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0051)
+SPACING = 0.0025
+asperities = cr.Asperities.hexagonal(spacing=SPACING, tip_radius=0.02, within=0.0051)
 scene = cr.Scene(
     1.0, asperities, cr.Material(contact_modulus=1.0, poisson_ratio=0.3), geometry="summit"
 )
@@ -100,7 +101,7 @@ assert lying.value > better + 0.1
 #
 # Half the distance to the nearest neighbour is always a valid :math:`s_i`.
 
-s = 0.0025 / 2
+s = SPACING / 2
 M = A + np.eye(len(D)) / (np.pi * s) * force / length
 print(f"least eigenvalue of M: {np.linalg.eigvalsh(M)[0]:.3f}")
 assert np.linalg.eigvalsh(M)[0] > 0

@@ -112,7 +112,7 @@ for count in counts:
     for approach in delta * np.linspace(0.6, 1.0, 41):
         x_all = -1.4 * a + 2.8 * a / count * (np.arange(count) + 0.5)
         exact = 2.8 * a / count * np.maximum(approach - x_all**2 / radius, 0)  # the QP's solution
-        squares.append((exact.sum() / (4 / 3 * approach**1.5) - 1) ** 2)
+        squares.append((exact.sum() / (4 / 3 * radius**0.5 * approach**1.5) - 1) ** 2)
     errors.append(float(np.sqrt(np.mean(squares))))
 order = float(-np.polyfit(np.log(counts), np.log(errors), 1)[0])
 print("errors:", *(f"{error:.1e}" for error in errors), f" order {order:.2f}")

@@ -73,7 +73,7 @@ def guessing_loop(k: Array, A: Array, D: Array, passes: int = 200) -> tuple[Arra
 
 def random_scene(rng: np.random.Generator) -> cr.Scene:
     """Four asperities whose discs do not overlap when pressed by APPROACH."""
-    while True:
+    for _ in range(10_000):
         points = rng.uniform(-0.0015, 0.0015, (4, 2)).round(5)
         heights = rng.uniform(0, 4e-5, 4).round(7)
         apart = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1)) + np.eye(4)
@@ -81,14 +81,18 @@ def random_scene(rng: np.random.Generator) -> cr.Scene:
             scene = cr.Scene(1.0, cr.Asperities(points, 0.02, heights), MATERIAL, geometry="summit")
             if cr.press(scene, approach=APPROACH).crowding < 1:
                 return scene
+    raise SystemExit("contact discs overlap in nearly all scenes: use a smaller APPROACH")
 
 
 APPROACH = 2e-5
 rng = np.random.default_rng(6)
-sets: list[str] = []
-while len(sets) < 200:
+for _ in range(5000):
     scene = random_scene(rng)
     loads, sets = guessing_loop(*law(scene, APPROACH))
+    if len(sets) == 200:
+        break
+else:
+    raise SystemExit("the loop has ended on 5,000 scenes: change APPROACH or the heights")
 points, heights = scene.asperities.positions, scene.asperities.heights
 print("places: ", points.tolist())
 print("heights:", heights.tolist())

@@ -208,7 +208,7 @@ assert float(error_1) <= certificate.load_errors[0] < 2 * float(bounds[0]) ** 0.
 h3 = 2 / (3 * Fraction(9, 20))
 rows = (A + Fraction(1, 4), A + Fraction(1, 5), Fraction(1, 4) + Fraction(1, 5))
 theta_3 = max(row / each for row, each in zip(rows, (*h, h3), strict=True))
-square_3 = (e[0] ** 2 / h[0] + e[1] ** 2 / h[1]) / (1 - theta_3) ** 2
+square_3 = (e[0] ** 2 / h[0] + e[1] ** 2 / h[1]) / (1 - theta_3) ** 2 if theta_3 < 1 else math.inf
 gap = P[0] / 4 + P[1] / 5 - Fraction(1, 5)
 tolerance = square_3 * (1 / (16 * h[0]) + 1 / (25 * h[1]))
 status = "open" if theta_3 < 1 and gap > 0 and gap**2 > tolerance else "not proved"

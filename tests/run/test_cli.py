@@ -77,8 +77,10 @@ def test_without_a_certificate(run: Any, command: Any) -> None:
     Path("summits.csv").write_text(TWINS)
     outcome = run(scene_text(SUMMITS, "load = 6.6e-8"), "--json")
     assert outcome.status == 3
-    proof = json.loads(outcome.out)["normal"]["certificate"]
+    normal = json.loads(outcome.out)["normal"]
+    proof = normal["certificate"]
     assert proof["scope"] == "none"
+    assert [normal[each] for each in ("contact", "open", "undecided", "loaded")] == [0, 0, 2, 2]
     assert proof["load_error"] is None
     assert "warning: not certified" in outcome.err
     assert "warning: contact discs overlap" in outcome.err

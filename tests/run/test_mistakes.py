@@ -77,6 +77,8 @@ MISTAKES = [
     (stage("[path]\nloads = [1e-7]\nforces = [0.0, 0.0]"),
      "[path] loads, forces: found 1 and 2 values"),
     (stage("[path]\nloads = [1e-7]\nforces = [1e-7]"), "[path]: forces[0]"),
+    (stage("[steady]\nellipse = {load = 1, load_amplitude = -2, force_amplitude = 1}"),
+     "[steady] ellipse.load_amplitude: found -2, expected at most the load 1 in size"),
     (stage(f"[steady]\n{ELLIPSE}90}}"), f"[steady] ellipse.phase: found 90, {DEGREES}"),
     (stage(f"[steady]\n{ELLIPSE}0.0}}\nphases = [3.1416, 180.0]"),
      f"[steady] phases[1]: found 180.0, {DEGREES}"),

@@ -146,6 +146,7 @@ def test_an_array_that_ends_inside_the_contact_is_told() -> None:
         (wide, 1.0, {"approach": -1e-6}, "no asperity carries a load: check the sign and unit"),
         (few, 1.0, {"approach": 1e-5}, ""),
         (few, 1.0, {"approach": 1.5e-5}, "100% of the asperities at the rim"),
+        (few, 1.0, {"approach": 1.1e-5}, ""),  # all touch, and all of the pattern that could
         (square, 1.0, {"approach": 7e-5}, "75% of the asperities at the rim"),
         (corner, 1.0, {"load": 3.6e-7}, "axis of the sphere, at x = 0 and y = 0"),
         (corner, (1.0, np.inf), {"load": 3.6e-7}, "axis of the sphere, at x = 0 and y = 0"),

@@ -114,7 +114,7 @@ def describe(normal: Summary, units: UnitNames) -> list[str]:
     normal : a summary, made by `judged_loads` or by a `NormalResult`
     """
     proof = normal["certificate"]
-    able = f"  ({normal['candidates']} could touch)" if "candidates" in normal else ""
+    able = f"  ({normal['candidates']} could carry load)" if "candidates" in normal else ""
     width, largest = len(str(normal["asperities"])), normal["largest_load"]
     relative = ""
     if largest and math.isfinite(proof["load_error"]):

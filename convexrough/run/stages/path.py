@@ -51,6 +51,9 @@ class _Points(Stage):
         if self.ellipse is not None:
             if (loads, forces) != (None, None):
                 yield "ellipse", "found with loads or forces, expected an ellipse or both lists"
+            if abs(amplitude := self.ellipse.load_amplitude) > self.ellipse.load:
+                expects = f"at most the load {self.ellipse.load:g} in size"
+                yield "ellipse.load_amplitude", f"found {amplitude:g}, expected {expects}"
         elif loads is None or forces is None:
             yield "loads, forces", "missing, both are needed without an ellipse"
         elif len(loads) != len(forces) or not loads:
