@@ -7,6 +7,7 @@ for a wrong number of values. No function needs a test framework.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from typing import ParamSpec, TypeVar
 
@@ -21,6 +22,7 @@ from convexrough.friction.shear import ShearCertificate
 from convexrough.friction.verdict import verify_shear
 from convexrough.normal.certificate import Certificate, certify
 from convexrough.normal.claims import WITHIN, Claim, tolerance
+from convexrough.plausibility import cautions_about
 from convexrough.record import Record
 from convexrough.scene.scene import Scene
 from convexrough.verdict import verify
@@ -42,7 +44,7 @@ def assert_certified(
     """The certificate of loads, after a check that they are right.
 
     The check is passed if it is proved that exactly the asperities with a load touch, and that no
-    error exceeds `within`; otherwise AssertionError is raised.
+    error exceeds `within`; otherwise AssertionError is raised. Overlapping discs give a warning.
 
     Arguments are those of `verify`: loads (n,) [force] from any source; the prescribed approach
     [length] or load [force]; the largest error allowed; and a floor up to which loads count as 0.
@@ -54,6 +56,9 @@ def assert_certified(
     verdict = _asked(verify, scene, loads, approach=approach, load=load, within=within, floor=floor)
     if len(verdict.undecided) == len(scene):
         _check_proof(verdict.certificate)
+    cautions = "\n".join(cautions_about(scene, np.where(verdict.claimed, verdict.loads, 0.0)))
+    if "contact discs overlap" in cautions:  # others are not about the model
+        warnings.warn(cautions, stacklevel=2)
     _check(verdict)
     return verdict.certificate
 

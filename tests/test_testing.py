@@ -51,6 +51,16 @@ def test_certified(contact: cr.Contact, control: str) -> None:
     assert_certified(paper(), list(contact.loads), **prescribed)
 
 
+def test_discs_that_overlap_are_warned_of() -> None:
+    scene = cr.Scene(1.0, cr.Asperities([[0, 0], [0.01, 0]], 0.1), cr.Material(1.0, 0.3))
+    loads = cr.press(scene, load=1e-5).loads
+    with pytest.warns(UserWarning, match="contact discs overlap") as warned:
+        assert_certified(scene, loads, load=1e-5)
+    assert warned[0].filename == __file__
+    with pytest.warns(UserWarning, match="contact discs overlap"):
+        failure(assert_certified, scene, 2 * loads, load=1e-5)
+
+
 def test_loads_not_certified_as_closely_as_asked(contact: cr.Contact) -> None:
     loads = np.array(contact.loads)
     loads[5] *= 1 + 1e-4

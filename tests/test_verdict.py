@@ -164,6 +164,7 @@ def test_loads_that_are_far_off_do_not_hold_by_default(wrong: str) -> None:
         (lambda points: points * [-1, 1], "the other sign of x"),
         (lambda points: points * [1, -1], "the other sign of y"),
         (lambda points: -points, "the other sign of x and y"),
+        (lambda points: points[:, ::-1] * [1, -1], "the array turned by -90 degrees"),
     ],
 )
 def test_exchanged_coordinates_of_a_square_array(moved: Any, said: str) -> None:

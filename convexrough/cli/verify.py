@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -57,7 +58,19 @@ def _pairs(option: str, given: Sequence[str]) -> dict[str, str]:
     return pairs
 
 
-@click.command()
+class _Reporting(click.Command):
+    """A command that removes an earlier --junit FILE also if its other arguments are wrong."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        words = "\n".join(args).replace("--junit=", "--junit\n").split("\n")
+        earlier = Path(dict(pairwise(words)).get("--junit", ""))
+        if "--force" in words and earlier.suffix.lower() == ".xml" and not ctx.resilient_parsing:
+            with suppress(OSError):  # `verify` reports it
+                earlier.unlink(missing_ok=True)
+        return super().parse_args(ctx, args)
+
+
+@click.command(cls=_Reporting)
 @click.argument("scene", type=common.PATH)
 @click.argument("loads", type=common.PATH)
 @common.option("--within PART", "Largest error allowed of a load or shear force, as a fraction of "

@@ -153,22 +153,24 @@ class Claim(ABC):
             yield f"the {self.many} {self._wrong_by(factor)}"
 
     def _moved(self, values: Array, true: Array) -> str:
-        """A symmetry of the array (exchanged axes or signs) that corrects forces; "" if none."""
+        """The symmetries of the array (axes, signs, turns) that correct forces; "" if none."""
         from scipy.spatial import cKDTree  # takes 0.1 s to import
 
         points = self.of.asperities.positions
-        tree, size = cKDTree(points), float(np.abs(points).max())
+        tree, size, found = cKDTree(points), float(np.abs(points).max()), list[str]()
         for said, moved in (
             ("x and y exchanged", points[:, ::-1]),
             ("the other sign of x", points * [-1, 1]),
             ("the other sign of y", points * [1, -1]),
             ("the other sign of x and y", -points),
-        ):
+            *((f"the array turned by {each} degrees", turned(points, -each))
+              for each in (60, -60, 90, -90, 120, -120)),
+        ):  # fmt: skip
             distances, partners = map(np.asarray, tree.query(moved))
             left, apart = (np.abs(each - true).max() for each in (values[partners], values))
             if distances.max() <= SAME_PLACE * size and left <= min(WITHIN, REMAINING * apart):
-                return said
-        return ""
+                found.append(said)
+        return " or ".join(found)
 
     def _wrong_by(self, factor: float) -> str:
         size = f"are {abs(factor):.4g} times those of the solution"
@@ -259,6 +261,12 @@ class Claim(ABC):
             stand_out[:] = False
         stand_out[wrong] = True
         return frozen(order[stand_out[order]])
+
+
+def turned(points: Array, degrees: float) -> Array:
+    """(n, 2) the points, turned about the origin."""
+    moved: Array = (points @ np.array([1, 1j]) * np.exp(1j * np.radians(degrees))).view(np.float64)
+    return moved.reshape(-1, 2)
 
 
 def _power_of_ten(factor: float) -> int:

@@ -18,8 +18,9 @@ from convexrough.errors import ConvexroughError, FileError
 
 Columns = dict[str, list[Any]]
 
-#: Names of arrays that may hold factors or offsets of the columns in the same file.
-FACTORS = re.compile(r"(?<![a-z])(scales?|factors?|multipliers?|gain|offsets?)(?![a-z])", re.I)
+#: Names of arrays, and words of comments, for factors or offsets; the end of "heights x 1000".
+FACTORS = re.compile(r"(?<![a-z])(scale[ds]?|fa[ck]tors?|multipl\w+|gain|offsets?)(?![a-z])", re.I)
+TIMES = re.compile(r"[^\d\s](\s*[*×]|\s+x)\s*\d\S*\s*$")
 
 #: Extensions of files of arrays.
 ARRAYS = (".npy", ".npz", ".mat", ".parquet")
@@ -134,11 +135,17 @@ def _is_table(name: str, values: Any, known: Sequence[str]) -> bool:
 
 def _of_one_shape(path: Path, arrays: dict[str, NDArray[Any]], known: Sequence[str]) -> Columns:
     """All vectors; or all arrays of one two-dimensional shape, if all `known` arrays have it."""
+    axes = {each.size: name for name, each in arrays.items() if name.lower() in ("x", "y")}
+    wide = [each.shape for name, each in arrays.items() if name.lower() in known and each.ndim > 1]
+    if wide and len(axes) == 2 == len(wide[0]) and axes.keys() == {*wide[0]}:  # lengths show order
+        names = [axes[size] for size in wide[0]]
+        mesh = np.meshgrid(*(arrays[name] for name in names), indexing="ij")
+        arrays = arrays | dict(zip(names, mesh, strict=True))
     shapes = {name: each.shape for name, each in arrays.items() if name.lower() in known}
-    wide = [shape for shape in shapes.values() if len(shape) > 1]
     if wide and (len(shapes) == 1 or {*shapes.values()} != {wide[0]}):
         found = ", ".join(f"{name} of {' x '.join(map(str, it))}" for name, it in shapes.items())
         expected = "vectors, or x, y and values of one shape"
+        expected += ": vectors x, y do not show what the rows are" * (len({*wide[0]}) == 1)
         raise FileError(f"{path}: found {found} numbers, expected {expected}")
     return {name: each.ravel().tolist() for name, each in arrays.items()
             if (each.shape == wide[0] if wide else each.ndim == 1)}  # fmt: skip

@@ -8,6 +8,7 @@ from itertools import product
 from typing import NamedTuple
 
 from convexrough.errors import InputError
+from convexrough.tabular.arrays import FACTORS, TIMES
 from convexrough.tabular.units import NAMELESS, Unit, UnitNames, bare, in_text, known_unit, parsed
 
 
@@ -166,10 +167,14 @@ def factors_of(
 
 
 def units_in(said: Iterable[tuple[str, str]], names: Sequence[str], how: Reading) -> Iterator[str]:
-    """A mistake for each text, said at a place in the file, that names another unit than the
-    scene's for one of the columns `names`, whose headers state none."""
+    """A mistake for each text, said at a place in the file, that states a factor, or names another
+    unit than the scene's for one of the columns `names`, whose headers state none."""
     kinds = {COLUMNS[name].kind for name in names}
     for place, text in said:
+        factor = any(map(str.isdecimal, text)) and (FACTORS.search(text) or TIMES.search(text))
+        if factor and not how.scales:
+            way = ", or --scale" * how.scalable
+            yield f"{place}: found {shortened(text)!r}, expected no factor of the numbers{way}"
         for name in in_text(text):
             found = parsed(name)
             kind = found.kind if found else "length"

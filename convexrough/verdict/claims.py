@@ -172,6 +172,7 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
         if name == "load" and not summed:
             place.mistakes += _contradicted(values, floor, table)
     refuse(path, place.mistakes)
+    place.how += place.part
     status = None
     if "status" in columns:
         status = np.full(len(scene), "open", dtype=np.result_type(columns["status"], "U4"))

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from convexrough.arrays import Array, Indices
 from convexrough.contact import discs_of
 from convexrough.errors import InputError
+from convexrough.normal.claims import turned
 from convexrough.scene.neighbours import nearest_distances
 from convexrough.scene.scene import Scene
 from convexrough.tabular.columns import bound
@@ -89,7 +90,7 @@ class Placing:
             return found
         advice = "" if by else unused(self.table)
         if rows < count and (by or self._indices()):
-            advice = "; --missing-open claims that the others are open"
+            advice = f"{self.part}; --missing-open claims that the others are open"
         elif rows > count and (self.points is None or len(np.unique(self.points, axis=0)) > count):
             advice += "; --nodes sums rows by asperity"
         expected = f"expected {count}, one per asperity of the scene{advice}"
@@ -156,6 +157,16 @@ class Placing:
             if np.array_equal(owners, before):
                 return owners, radii
         return nearest, discs(nearest)
+
+    @property
+    def part(self) -> str:
+        """A text if rows are on one side of an axis only, and asperities on both; else ""."""
+        own, near = self.scene.contact_points, POSITION_TOLERANCE * self._spacing
+        points = own if self.points is None else self.points
+        ways = (("x >=", (1, 0)), ("x <=", (-1, 0)), ("y >=", (0, 1)), ("y <=", (0, -1)))
+        sides = [f"{side} 0" for side, along in ways
+                 if (points @ along).min() >= -near > (own @ along).min()]  # fmt: skip
+        return f"; rows only at {', '.join(sides)}: part of a symmetric array?" if sides else ""
 
     # By an index, or in order
 
@@ -329,6 +340,12 @@ class Placing:
             if moved := self._misread(every, self._shifted(points)):
                 self.mistakes.append(f"positions: {moved}")
                 return owners
+            placed = len(np.unique(owners[~far]))
+            if 2 * placed < len(points) and [*self._called.values()] == ["1", "2", "3"]:
+                found = f"found {placed} positions of asperities in {len(points)} rows"
+                forces = "if the columns are forces along x, y and z: --column load=3"
+                self.mistakes.append(f"columns 1, 2: {found}, expected x, y, load; {forces}")
+                return owners
         if far.any() and alone and float(bound(most, 1)) <= self._spacing / 2:
             found = f"found them up to {most:.3g} from the nearest asperities"
             advice = f"if they are rounded: --tolerance {bound(most, 1)}"
@@ -369,12 +386,15 @@ class Placing:
                 yield said, np.column_stack([held[name] for name in order[:2]])
 
     def _readings(self, rows: NDArray[np.bool_]) -> Iterator[Read]:
-        """Other axes, signs and units of x and y."""
+        """Other axes, turns, signs and units of x and y."""
         called, held = self._called, self.table.columns
         points = np.column_stack((held["x"], held["y"]))[rows]
         exchanged = {"x": called["y"], "y": called["x"]}
         exchange = _options("column", exchanged if self._headed else called | exchanged)
-        yield f"x and y are exchanged, or the array is turned: {exchange}", points[:, ::-1]
+        turns = [it for it in (30, -30, 45, -45, 90, -90) if self._fits(turned(points, -it))]
+        turn = f"the array is turned by {' or '.join(map(str, turns))} degrees: turn it back"
+        yield f"x and y are exchanged: {exchange}{f'; or {turn}' * bool(turns)}", points[:, ::-1]
+        yield from ((turn, turned(points, -each)) for each in turns[:1])
         for names, verb in (("x", "has"), ("y", "has"), ("xy", "have")):
             factors = {name: -self.table.factors.get(name, 1.0) for name in names}
             ways = _options("scale", {name: f"{each:.15g}" for name, each in factors.items()})

@@ -65,16 +65,17 @@ def _proved(claim: Claim) -> str:
         return f"{claim.proved} wrong"
     if len(claim.undecided):
         return f"{claim.proved} not proved"
-    near = f"{claim.many} correct to within {_size(claim)} {claim.one}"
+    near = f"{claim.many} correct to within {_size(claim)}"
     if not claim.near_enough:
-        near = f"errors of up to {_size(claim)} {claim.one}, more than allowed"
+        near = f"errors of up to {_size(claim)}, more than allowed"
     total = "" if claim.total_holds else f"; total {claim.one} differs"
     return f"{claim.proved} proved; {near}{total}"
 
 
 def _size(claim: Claim) -> str:
-    per_cent = claim.error > PERCENT
-    return f"{f'{bound(100 * claim.error)} %' if per_cent else bound(claim.error)} of the largest"
+    size = f"{bound(100 * claim.error)} %" if claim.error > PERCENT else bound(claim.error)
+    smaller = claim.nearby() is not None and claim.largest < np.abs(claim.values).max()
+    return f"{size} of the largest {claim.one}{' of the solution' if smaller else ''}"
 
 
 def describe_claim(claim: Claim, others: str = "") -> list[str]:
@@ -163,7 +164,7 @@ def _off(claim: Claim) -> str:
     allowed = f"{100 * claim.within:g} %" if claim.within > PERCENT else f"{claim.within:g}"
     if math.isinf(claim.error):
         return f"no bound is proved ({allowed} allowed)"
-    return f"at most {_size(claim)} {claim.one} ({allowed} allowed{beyond})"
+    return f"at most {_size(claim)} ({allowed} allowed{beyond})"
 
 
 def _total(claim: Claim, unit: str) -> str:

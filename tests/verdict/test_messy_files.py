@@ -183,6 +183,11 @@ READ: dict[str, tuple[Any, ...]] = {
     "another name": (lambda case: case.table("x y P"), "a.csv", "--column load=P"),
     "units below the header": (
         lambda case: lines(case.table()).replace("load\n", "load\nm,m,N\n", 1),),
+    "comments without a factor": (
+        lambda case: "# against run 7, 3 × 4 sites\n# sites 4 x 3\n" + lines(case.table()),),
+    "vectors of forces, of which the third is named": (
+        lambda case: {"F": np.column_stack((case.loads, 0 * case.loads, case.loads))}, "a.mat",
+        "--column load=3"),
     "the scene's units in a comment": (
         lambda case: "# lengths in m, loads in N, E = 210 GPa\n" + lines(case.table()),),
     "pixels of a map": (Case.pixels, "a.csv", "--within 1e-9"),
@@ -269,7 +274,22 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "pixels shifted": (lambda case: case.pixels() | {"x": case.pixels()["x"] + 2e-4}, "",
                        "all are shifted by about [0.0001997, 9e-08], expected x, y rela"),
     "x and y exchanged": (lambda case: case.table("y x load"), "",
-                          "x and y are exchanged, or the array is turned: --column x=y --c"),
+                          "positions: x and y are exchanged: --column x=y --column y=x\n"),
+    "an array turned": (lambda case: case.table("y x load") | {"y": -PLACES[case.order, 0]}, "",
+                        "positions: the array is turned by -90 degrees: turn it back\n"),
+    "a quarter of an array": (
+        lambda case: {name: each[(PLACES[case.order] >= 0).all(axis=1)]
+                      for name, each in case.table().items()}, "",
+        "rows: found 4, expected 12, one per asperity of the scene; rows only at x >= 0, y >= 0: "
+        "part of a symmetric array?; --missing-open"),
+    "vectors of forces": (
+        lambda case: {"F": np.column_stack((0 * case.loads, 0 * case.loads, case.loads))}, "a.npz",
+        "columns 1, 2: found 0 positions of asperities in 12 rows, expected x, y, load; if the "
+        "columns are forces along x, y and z: --column load=3"),
+    **{f"a factor in a comment, {said!r}": (
+        lambda case, said=said: f"# {said}\n" + lines(case.table()), "",
+        f"comments: found '# {said}', expected no factor of the numbers, or --scale\n")
+       for said in ("loads x 1000", "loads * 1e3", "scale factor: 1e-3", "multiplied by 9")},
     "places under other names": (lambda case: case.table("COORD1 COORD2 load"), "",
                                  "COORD1, COORD2: found positions in another order than the sc",
                                  "expected --column x=COORD1 --column y=COORD2"),
@@ -444,16 +464,25 @@ def test_nodes_with_loads_in_a_wrong_unit(tmp_path: Path, factor: float) -> None
     np.testing.assert_allclose(claimed.values, loads * factor, rtol=1e-6)
 
 
-def test_a_lattice_shifted_by_its_spacing(tmp_path: Path) -> None:
-    """Most rows lie on an asperity, the wrong one."""
-    asperities = cr.Asperities.square(spacing=1e-3, tip_radius=0.02, within=4e-3)
+@pytest.mark.parametrize(
+    ("pattern", "moved", "cause"),
+    [
+        (cr.Asperities.square, lambda points: np.add(points, [1e-3, 0]),
+         "all are shifted by [0.001, 0], to within 1e-05, expected x, y relative to the sphere's"),
+        (cr.Asperities.hexagonal, lambda points: points[:, ::-1],
+         "x and y are exchanged: --column x=y --column y=x; or the array is turned by 30 or -30 "
+         "or 90 or -90 degrees: turn it back"),
+    ],
+)  # fmt: skip
+def test_a_lattice_moved(tmp_path: Path, pattern: Any, moved: Any, cause: str) -> None:
+    """Most rows of the shifted one lie on an asperity, the wrong one."""
+    asperities = pattern(spacing=1e-3, tip_radius=0.02, within=4e-3)
     scene = cr.Scene(1.0, asperities, cr.Material(contact_modulus=1.0, poisson_ratio=0.3))
-    x, y = asperities.positions.T
-    name = put(tmp_path, {"x": x + 1e-3, "y": y, "load": np.ones(len(x))})
+    x, y = moved(asperities.positions).T
+    name = put(tmp_path, {"x": x, "y": y, "load": np.ones(len(x))})
     with pytest.raises(TableError) as refused:
         read_loads(tmp_path / name, scene, Manner())
-    cause = "all are shifted by [0.001, 0], to within 1e-05, expected x, y relative to the sphere's"
-    assert f"{tmp_path / name}: positions: {cause} axis" in str(refused.value)
+    assert f"{tmp_path / name}: positions: {cause}" in str(refused.value)
 
 
 def test_positions_of_contact_points(tmp_path: Path) -> None:
@@ -632,6 +661,9 @@ def test_explain_reads_and_judges_nothing(case: Case) -> None:
     shown = case.verify(table, *asked, "--json")
     assert json.loads(shown.out)["read"] == outcome.out.removesuffix("\n").split("\n")
     assert case.verify(table, *asked, "--junit", "a.xml").refuses("--explain checks nothing")
+    assert "rows only" not in outcome.out
+    half = {name: each[case.pixels()["x"] >= 0] for name, each in case.pixels().items()}
+    assert "; rows only at x >= 0: part of a symmetric array?" in case.verify(half, "--explain").out
 
 
 def test_loads_beside_pressures(case: Case) -> None:
@@ -659,6 +691,15 @@ def test_findings_as_junit(case: Case) -> None:
     said = str(suite("b.xml")[0][0].text)
     assert f"rows: found {len(case.loads) - 1}" in said
     assert said in outcome.err
+    for wrong in (
+        ["--junit=b.xml"],
+        ["--nope", "--junit", "b.xml"],
+        ["loads.csv", "--junit", "b.xml", "--explain"],
+    ):  # an earlier report remains only without --force
+        Path("b.xml").touch()
+        for force in ([], ["--force"]):
+            assert case.command("verify", "scene.toml", *wrong, *force).status == 2
+            assert Path("b.xml").exists() == (not force)
 
 
 def test_bytes_of_every_kind_end_in_a_reason(case: Case) -> None:

@@ -153,8 +153,16 @@ def test_arrays_of_two_dimensions(tmp_path: Path) -> None:
     area = 0.1 * 0.1
     found = read(tmp_path, {"x": x, "y": y, "pressure": pressure}, "a.npz").values
     assert found == pytest.approx(area * np.array([1.0, 0.0, pressure.sum() - 1.0]))
-    for made in ({"x": x[0], "y": y[:, 0], "pressure": pressure}, {"load": pressure}):
-        with pytest.raises(cr.FileError, match=r"of 28 x 13 numbers, expected vectors, or x, y an"):
+    axes = {"y": y[:, 0], "x": x[0], "more": np.eye(4)}  # whose lengths show which is along rows
+    for matrix in (pressure, pressure.T):
+        assert (read(tmp_path, axes | {"pressure": matrix}, "a.npz").values == found).all()
+    lone, square, nodes = {"load": pressure}, pressure[:13], np.ones((28, 3))
+    for made, said in (
+        (lone, "load of 28 x 13 numbers, expected vectors, or x, y and values of one shape"),
+        (axes | {"y": y[:13, 0], "pressure": square}, "shape: vectors x, y do not show what the r"),
+        (axes | {"x": y[:, 0], "pressure": nodes}, "pressure of 28 x 3 numbers, expected vectors"),
+    ):
+        with pytest.raises(cr.FileError, match=said):
             read(tmp_path, made, "b.npz")
 
 
@@ -222,7 +230,8 @@ def test_loads_at_a_slightly_different_place(tmp_path: Path, offset: float, fine
         ("x,y,load\n0,0,1\n0,0,1\n1,0,1\n", "row 3: found the same position as in row 2"),
         ("x,y,load\n0,0,1\n1,0,1\n0,2,1\n", "row 4: found position [0.0, 2.0], 0.707107 from"),
         ("1,2\n1,2\n1,2\n", "columns: found no header and 2 columns, expected a column 'load'"),
-        ("1,2,3\n4,5,6\n7,8,9\n", "row 1: found position [1.0, 2.0], "),
+        ("1,2,3\n4,5,6\n7,8,9\n", "columns 1, 2: found 0 positions of asperities in 3 rows"),
+        ("0,0,3\n1,0,6\n7,8,9\n", "row 3: found position [7.0, 8.0], "),
         ("node,load\n103,1\n101,1\n102,1\n", "column node: found 103, expected at most 3, the"),
         ("x_mm,y_mm,load\n0,0,1\n1,0,1\n2,0,1\n", "expected --column x=x_mm --column y=y_mm"),
         (b"PK\x03\x04...", "not text: an archive or an Excel workbook; name it .xlsx"),
@@ -295,6 +304,8 @@ def test_summits_without_a_header(tmp_path: Path) -> None:
         ("x,y,depth\n0,0,1\n", "sphere: write depths as negative heights"),
         ("x,y\n0,0\n", "tip radii: found neither"),
         ("x,y\n0,0\n0,0\n", "asperities 0 and 1"),
+        ("# heights x 1000\nx,y,z\n0,0,1\n", "found '# heights x 1000', expected no factor of the"),
+        ("# units: micrometres\nx,y,z\n0,0,1\n", "found '# units: micrometres', expected units in"),
     ],
 )
 def test_wrong_summits(tmp_path: Path, content: str, expected: str) -> None:

@@ -105,6 +105,8 @@ def test_json_and_files(command: Any, contact: cr.Contact, tmp_path: Path) -> No
 def test_loads_in_another_unit(command: Any, contact: cr.Contact, scene: str) -> None:
     outcome = command("verify", scene, claim(contact, factor=1e3))
     assert outcome.status == 3
+    assert " % of the largest load of the solution (1 % allowed" in outcome.out
+    assert "of the largest given load)\n" in outcome.out
     hint = "hint: the loads are 10^3 times what they should be: another unit of force (as mN for N)"
     assert hint + (", or of the modulus?" if scene == "a.toml" else "?") in outcome.err
     elsewhere = command("verify", scene, claim(contact, factor=1.0989))  # E* without 1 - nu^2

@@ -116,9 +116,9 @@ def describe(normal: Summary, units: UnitNames) -> list[str]:
     proof = normal["certificate"]
     able = f"  ({normal['candidates']} could carry load)" if "candidates" in normal else ""
     width, largest = len(str(normal["asperities"])), normal["largest_load"]
-    relative = ""
+    relative, given = "", "" if "solver" in normal else "given "
     if largest and math.isfinite(proof["load_error"]):
-        relative = f"  ({bound(proof['load_error'] / largest)} of the largest load)"
+        relative = f"  ({bound(proof['load_error'] / largest)} of the largest {given}load)"
     crowding = normal.get("crowding", 0.0)
     model = f" (but the model does not apply: crowding {crowding:.3g})" if crowding > 1 else ""
 
