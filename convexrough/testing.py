@@ -56,7 +56,8 @@ def assert_certified(
     verdict = _asked(verify, scene, loads, approach=approach, load=load, within=within, floor=floor)
     if len(verdict.undecided) == len(scene):
         _check_proof(verdict.certificate)
-    cautions = "\n".join(cautions_about(scene, np.where(verdict.claimed, verdict.loads, 0.0)))
+    given, approach = np.where(verdict.claimed, verdict.loads, 0.0), verdict.certificate.approach
+    cautions = "\n".join(cautions_about(scene, given, approach))
     if "contact discs overlap" in cautions:  # others are not about the model
         warnings.warn(cautions, stacklevel=2)
     _check(verdict)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
@@ -171,8 +172,9 @@ def units_in(said: Iterable[tuple[str, str]], names: Sequence[str], how: Reading
     unit than the scene's for one of the columns `names`, whose headers state none."""
     kinds = {COLUMNS[name].kind for name in names}
     for place, text in said:
-        factor = any(map(str.isdecimal, text)) and (FACTORS.search(text) or TIMES.search(text))
-        if factor and not how.scales:
+        numbers = {*map(float, re.findall(r"\d+(?:\.\d+)?(?:e[+-]?\d+)?", text, re.I))} - {0.0, 1.0}
+        factor = FACTORS.search(text) or TIMES.search(text)
+        if numbers and factor and not how.scales:
             way = ", or --scale" * how.scalable
             yield f"{place}: found {shortened(text)!r}, expected no factor of the numbers{way}"
         for name in in_text(text):

@@ -184,7 +184,7 @@ READ: dict[str, tuple[Any, ...]] = {
     "units below the header": (
         lambda case: lines(case.table()).replace("load\n", "load\nm,m,N\n", 1),),
     "comments without a factor": (
-        lambda case: "# against run 7, 3 × 4 sites\n# sites 4 x 3\n" + lines(case.table()),),
+        lambda case: "# run 7, 3 × 4 sites\n# load factor = 1.0\n" + lines(case.table()),),
     "vectors of forces, of which the third is named": (
         lambda case: {"F": np.column_stack((case.loads, 0 * case.loads, case.loads))}, "a.mat",
         "--column load=3"),
