@@ -40,8 +40,8 @@ STATUSES = ("contact", "open", "stuck", "partial", "sliding", "intermittent", "u
 KINDS = {
     "force": ("load", "force", "largest_load", "load_error", "force_amplitude", "level", "front"),
     "length": ("approach", "displacement", "displacement_amplitude", "approach_error",
-               "displacement_error", "gap_error", "radius", "spacing", "tip_radius", "within",
-               "height_std"),
+               "displacement_error", "prescribed_displacement", "gap_error", "radius", "spacing",
+               "tip_radius", "within", "height_std"),
     "work": ("loss", "loss_error", "loss_first", "loss_first_error", "duality_gap", "smooth",
              "partial_slip_loss", "sliding_loss"),
     "stiffness": ("secant_stiffness",),
