@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 from typing import Any, ClassVar
 
@@ -19,6 +20,7 @@ from convexrough.contact import Contact
 from convexrough.friction.cycle import Cycle
 from convexrough.friction.state import states_of, stick_radii
 from convexrough.plottable import Plottable
+from convexrough.progress import LOGGER
 from convexrough.record import Along, Table
 from convexrough.sphere import hertz, mindlin
 
@@ -92,11 +94,13 @@ def fretting(cycle: Cycle) -> Fretting:
     rim = f * float(mindlin.ratio(scene.material.poisson_ratio)) * a**2 / R
     in_part = rim * rim_gap(np.minimum(_over(cycle.stick_radii, a), 1.0))
     mean = largest = np.full(len(scene), unknown)
-    for curve, forces in zip(walk.steady, states_of(levels, walk.steady).forces.value, strict=True):
+    known = cache(lambda load: stick_radii(levels, levels.at(load))[0])
+    every = states_of(levels, walk.steady).forces.value
+    for k, (curve, forces) in enumerate(zip(walk.steady, every, strict=True), 1):
+        LOGGER.info(f"tractions at point {k:,} of {len(every):,}")
         bends = [(load, float(bend)) for load, bend in curve.bends if bend and load]
-        radii = [stick_radii(levels, levels.at(load))[0] for load, _ in bends]
-        here = stick_radii(levels, levels.at(curve.load))[0]
-        mean = np.maximum(mean, _over(np.abs(forces), np.pi * here**2))
+        mean = np.maximum(mean, _over(np.abs(forces), np.pi * known(curve.load) ** 2))
+        radii = [known(load) for load, _ in bends]
         largest = np.maximum(largest, _largest(np.array([bend for _, bend in bends]), radii))
     return Fretting(
         contact=contact,

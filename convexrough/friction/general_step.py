@@ -29,7 +29,7 @@ from convexrough.friction.levels import FrictionLevels
 from convexrough.friction.state import States, by_status
 from convexrough.influence import couple
 from convexrough.progress import LOGGER
-from convexrough.roundoff import ROUNDOFF
+from convexrough.roundoff import AT_THE_END, ROUNDOFF
 from convexrough.sphere import hertz
 
 #: Newton's method stops at this residual, relative to the largest indentation. If rounding prevents
@@ -212,8 +212,9 @@ class Stepper:
             lost = float(now.height) / 2 * now.displacement
             return self.start(load)._replace(work=now.work - lost)
         step = Step.to(now, self.levels.depths(load), float(height))
+        gross = load - abs(height) <= AT_THE_END * Fraction(ROUNDOFF) * load
         try:
-            eta, x, own = self._gross(step) if abs(height) == load else self._solve(step)
+            eta, x, own = self._gross(step) if gross else self._solve(step)
         except SolverError:
             if cuts == 0:
                 raise

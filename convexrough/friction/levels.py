@@ -98,19 +98,16 @@ class FrictionLevels:
         gross sliding starts.
         """
         room = self.top.approach - self.at(Fraction(0)).approach
-        farthest = float((room * self.travel_unit).value)
-        if not displacement <= farthest * (1 + 1e-14):
-            found = f"{displacement:.17g}: gross sliding"
-            expected = f"at most X = {farthest:.17g}, at which gross sliding starts"
-            raise InputError("displacement", found=found, expected=expected)
-        lowered = Ball.exact(displacement) / self.travel_unit
-        if not (room - lowered).value > AT_THE_END * ROUNDOFF * lowered.value:
+        if is_gross(displacement, room * self.travel_unit):
             return Fraction(0)
+        lowered = Ball.exact(displacement) / self.travel_unit
         if displacement == 0.0:
             return self.load
         level = self._levels.at_approach(self.top.approach - lowered)
         drop = sum(Fraction(float(part)) for part in (self.top.load - level.load).mid)
         load = self.load - drop * Fraction(self.units.force)
+        if load <= 0:  # where the load P is rounded
+            load = Fraction(float(level.load.value) * self.units.force)
         self._named[load] = level
         return load
 
@@ -166,6 +163,19 @@ class FrictionLevels:
         if self._prescribed is not None:
             return exactly(loads).scaled(1.0 / self.units.force)
         return self.top.load - exactly([self.load - x for x in loads]).scaled(1 / self.units.force)
+
+
+def is_gross(displacement: float, farthest: Ball) -> bool:
+    """True if X = `displacement` is `farthest`, where gross sliding starts, up to rounding.
+
+    Raises InputError for larger X.
+    """
+    if not displacement <= (most := float(farthest.value)) * (1 + 1e-14):
+        found = f"{displacement:.17g}: gross sliding"
+        expected = f"at most X = {most:.17g}, at which gross sliding starts"
+        raise InputError("displacement", found=found, expected=expected)
+    left = (farthest - Ball.exact(displacement)).value
+    return not left > AT_THE_END * ROUNDOFF * displacement
 
 
 def height_at(load: Fraction, force: float | Fraction, scene: Scene) -> Fraction:

@@ -16,7 +16,7 @@ from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.general_step import followed
-from convexrough.friction.levels import FrictionLevels
+from convexrough.friction.levels import FrictionLevels, is_gross
 from convexrough.friction.order import Order
 from convexrough.friction.state import stick_radii
 from convexrough.friction.walk import Walk
@@ -24,6 +24,7 @@ from convexrough.normal.boxes import Scope
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
 from convexrough.record import Along, Proved, Table
+from convexrough.roundoff import ROUNDOFF
 
 if TYPE_CHECKING:
     from convexrough.gradients.change import Direction, ShearChange
@@ -200,15 +201,15 @@ def shear(
     else:
         displacement = checks.finite("displacement", displacement)
         height = P - levels.displaced(abs(displacement))
+        if levels.proved and Walk(levels, start, [(P, height)]).order == "fails":
+            height = _by_steps(levels, abs(displacement))
         height = height if displacement >= 0 else -height
     walk = Walk(levels, start, [(P, height)])
-    if walk.general is not None and displacement is not None:
-        walk = Walk(levels, start, [(P, _by_steps(levels, displacement))])
     order, (moved, carried, asperities, drifts) = walk.order, (each[0] for each in walk.states())
     if walk.general is not None:
         squared = contact.scene.relative_radii * walk.general.fronts[0]
         radii, radius_errors = np.where(loaded, np.sqrt(squared), 0.0), np.zeros(len(loaded))
-        total = Ball.exact(walk.points[0][1]) * levels.coefficient
+        total = Ball.exact(height) * levels.coefficient
     else:
         level = levels.at(P - abs(height))
         radii, radius_errors = stick_radii(levels, level)
@@ -240,17 +241,23 @@ def shear(
         slips=frozen(np.where(loaded, drifts.value, 0.0)),
         stick_radii=frozen(radii),
         certificate=certificate,
-        height=walk.points[0][1],
+        height=height,
     )
 
 
 def _by_steps(levels: FrictionLevels, displacement: float) -> Fraction:
-    """The value of T = Q / f for which general steps from rest give this displacement."""
+    """The value of T = Q / f for which general steps from rest give this displacement X >= 0.
+
+    Raises InputError beyond the X at which gross sliding starts.
+    """
     from scipy.optimize import brentq  # 0.1 s to import: only when asked
 
-    def beyond(part: float) -> float:
+    def moved(part: float) -> float:
         points = [(levels.load, Fraction(part) * levels.load)]
         states = followed(levels, MemoryCurve.pressed(levels.load), points).states
-        return float(states.displacements.value[0] - displacement)
+        return float(states.displacements.value[0])
 
-    return Fraction(brentq(beyond, -1.0, 1.0, xtol=1e-12)) * levels.load
+    if is_gross(displacement, Ball.exact(moved(1.0))):
+        return levels.load
+    root = brentq(lambda part: moved(part) - displacement, 0.0, 1.0, xtol=1e-12)
+    return Fraction(min(root, 1.0 - ROUNDOFF)) * levels.load  # below gross sliding

@@ -22,6 +22,7 @@ from convexrough.normal.problem import NormalProblem
 from convexrough.normal.proved import proved, solution_in
 from convexrough.normal.refine import defect_of, refined_loads, rounding_of
 from convexrough.normal.stack import Stack
+from convexrough.progress import LOGGER
 from convexrough.roundoff import ROUNDOFF
 
 #: Largest number of asperities for which problems are solved together: for more asperities this
@@ -62,6 +63,7 @@ class Levels:
     def at(self, load: Ball) -> Level:
         """The level at a total load, positive or exactly 0. Raises ProofError for other loads."""
         if (key := _key(load)) not in self._known:
+            LOGGER.info(f"normal problem {self.presses + 1:,}")
             if load.positive:
                 self._known[key] = self._solved(self.problem.at_load(load))
             elif load.size == 0.0:
@@ -81,6 +83,8 @@ class Levels:
         fixed = problem.exact, problem.shells, problem.squares
         for start in range(0, len(loads), some):
             totals = loads[start : start + some]
+            to = start + len(totals)
+            LOGGER.info(f"normal problems {start + 1:,} to {to:,} of {len(loads):,}")
             rows = [(slice(0, len(totals)), problem)]
             level, good = solved(Stack.of(rows, *fixed, totals[:, None], by_load=True), closed)
             for k in range(len(totals)):

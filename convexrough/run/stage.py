@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough import checks, plots
-from convexrough.contact import Contact
-from convexrough.plausibility import CUT_OFF, array_extent, at_the_rim
+from convexrough.contact import Contact, press
+from convexrough.plausibility import CUT_OFF, array_extent, at_the_rim, ends
 from convexrough.record import Record, frame_of, rows_of, singular
 from convexrough.run.values import FileTable
 from convexrough.tabular.columns import aligned
@@ -40,8 +40,8 @@ STATUSES = ("contact", "open", "stuck", "partial", "sliding", "intermittent", "u
 KINDS = {
     "force": ("load", "force", "largest_load", "load_error", "force_amplitude", "level", "front"),
     "length": ("approach", "displacement", "displacement_amplitude", "approach_error",
-               "displacement_error", "gap_error", "radius", "spacing", "tip_radius", "within",
-               "height_std"),
+               "displacement_error", "prescribed_displacement", "gap_error", "radius", "spacing",
+               "tip_radius", "within", "height_std"),
     "work": ("loss", "loss_error", "loss_first", "loss_first_error", "duality_gap", "smooth",
              "partial_slip_loss", "sliding_loss"),
     "stiffness": ("secant_stiffness",),
@@ -97,7 +97,11 @@ class Stage(FileTable):
                 f"{name} has shear forces up to {self.highest_force:.4g}, less than {SLIGHT:g} of "
                 "the friction limit at the largest load: check the units of the forces"
             )
-        extent = array_extent(contact.scene, load)
+        scene, extent = contact.scene, array_extent(contact.scene, load)
+        inside = load > known and not ends(scene, contact.loads > 0)
+        if inside and ends(scene, np.full(len(scene), True)):  # a cylinder: press it further
+            top = press(scene, load=load, influence=contact.influence)
+            extent = 0.0 if ends(scene, top.loads > 0) else extent
         if extent is not None and extent < CUT_OFF:
             yield f"under the loads of {name} {at_the_rim(extent)}"
 

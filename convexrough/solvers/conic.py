@@ -68,7 +68,7 @@ class TooDenseError(InputError):
     >>> crowded = cr.Scene(1.0, blunt, cr.Material(1.0, 0.3), geometry="summit")
     >>> cr.press(crowded, approach=5e-5, solver="conic")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
-    convexrough.solvers.conic.TooDenseError: ... by asperity: 0 (1.00...), expected less than 1
+    convexrough.solvers.conic.TooDenseError: ... found 1, by index ... less than 1; Newton...
     """
 
     def __init__(self, solver: str, asperities: Indices, ratios: Array, limit: float) -> None:
@@ -78,9 +78,9 @@ class TooDenseError(InputError):
         more = f" and {len(ratios) - len(worst)} more" if len(ratios) > len(worst) else ""
         super().__init__(
             "asperities too dense for a convex program",
-            found="contact radii divided by pi/4 times the distance to the nearest neighbour, "
-            f"by asperity: {described}{more}",
-            expected=f"less than {limit:g}",
+            found=f"{len(ratios)}, by index with the contact radius divided by pi/4 times the "
+            f"distance to the nearest neighbour: {described}{more}",
+            expected=f"less than {limit:g}; Newton's method has no such limit",
             where=solver,
         )
 

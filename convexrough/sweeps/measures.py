@@ -181,6 +181,8 @@ def measured_together(asked: Mapping[int, Task], columns: Sequence[Column]) -> d
     stages = next(iter(asked.values())).stages  # the same [cycle] for all: see `grid.FIXED`
     cycle = stages.get("cycle") if "cycle" in wanted else None
     assert cycle is None or isinstance(cycle, CycleStage)
+    if cycle and cycle.displacement:
+        return {}
     groups: dict[tuple[int, bool], list[int]] = {}
     for number, each in asked.items():
         usual = each.solver.name == "newton" and each.influence in (None, "dense")

@@ -44,6 +44,16 @@ def test_tractions_are_those_of_the_field(high: float, low: float) -> None:
         assert found.mean_tractions[i] == pytest.approx(mean, rel=1e-5)
 
 
+def test_progress_on_a_long_path_is_told(caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level("INFO", logger="convexrough")
+    P = contact("paper").load
+    ellipse = {"load": P, "load_amplitude": 0.4 * P, "force_amplitude": 0.2 * P, "friction": 0.5}
+    loads, forces = cr.elliptic_path(**ellipse, chords=24)
+    cr.fretting(cr.steady(contact("paper").scene, loads=loads, forces=forces))
+    assert any(said.startswith("normal problems 1 to ") for said in caplog.messages)
+    assert f"tractions at point {len(loads)} of {len(loads)}" in caplog.messages
+
+
 @pytest.mark.sample(2)
 @pytest.mark.parametrize(("high", "low"), [(0.3, -0.3), (0.6, -0.6), (0.8, 0.1)])
 def test_slip_against_friction_costs_the_energy(high: float, low: float) -> None:

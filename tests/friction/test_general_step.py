@@ -62,6 +62,21 @@ def test_where_order_fails() -> None:
         assert_allclose(bristles.forces, fine.asperity_forces[k], atol=5e-3 * Q.max())
 
 
+@pytest.mark.parametrize("given", [{"load": 2.8}, {"approach": 1.25}, {"approach": 0.5}])
+def test_a_displacement_at_gross_sliding_or_just_below(given: dict[str, float]) -> None:
+    """Order fails but for the last contact. The shear force is f P up to rounding."""
+    contact = cr.press(shaded(), **given)
+    gross = cr.shear(contact, force=0.5 * contact.load)
+    assert gross.order == ("proved" if contact.load < 2 else "fails")
+    for part in (1.0, 1.0 - 1e-14, 1.0 - 1e-12):
+        state = cr.shear(contact, displacement=-part * gross.displacement)
+        assert state.displacement == pytest.approx(-part * gross.displacement, rel=1e-14)
+        assert state.force == pytest.approx(-gross.force, rel=1e-15)
+        assert_allclose(state.forces, -gross.forces, rtol=1e-9)
+    with pytest.raises(cr.InputError, match="gross sliding, expected at most X"):
+        cr.shear(contact, displacement=1.001 * gross.displacement)
+
+
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("points", [ONE, TWO])
 def test_three_ways_to_one_path(points: list[tuple[float, float]]) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scene_files import EVERYTHING, WITHIN, rows, scene_text
+from scene_files import EVERYTHING, FRICTION, WITHIN, rows, scene_text
 
 import convexrough as cr
 from convexrough.run.scene_file import read_scene
@@ -134,6 +134,13 @@ def test_a_run_says_what_the_package_says(run: Any, command: Any) -> None:
         own = [row for row in loop if (row["curve"], row["maximum_fraction"]) == (curve, "0.5")]
         force, moved = ([float(row[key]) for row in own] for key in ("force", "displacement"))
         assert np.trapezoid(force, moved) == pytest.approx(loss, rel=1e-3)
+
+    more = f"{FRICTION}[cycle]\ndisplacement = 9e-6\n"
+    prescribed = run(scene_text(WITHIN, more=more), "--out", "moved")
+    assert (prescribed.status, prescribed.err) == (0, "")
+    (row,), moved = rows("moved/cycle.csv"), cr.cycle(contact, displacement=9e-6)
+    assert (float(row["prescribed_displacement"]), float(row["loss"])) == (9e-6, moved.loss)
+    assert {each["prescribed_displacement"] for each in rows("moved/loop.csv")} == {"9e-06"}
 
     past = cr.history(contact, forces=np.array(file.stages["history"].fractions) * limit)
     assert summary["history"]["loss"] == past.losses.tolist()

@@ -100,12 +100,13 @@ def test_what_is_only_checked_is_not_certified(tmp_path: Path) -> None:
 
 def test_an_array_for_the_largest_load_of_a_path(tmp_path: Path) -> None:
     """The pattern is wide enough for loads above that of [normal]; too narrow ones are told."""
-    normal = "load = 3e-8"
     path = FRICTION + "[path]\nloads = [1.2e-6, 1.2e-6]\nforces = [0.0, 1e-7]\n"
 
-    def run(within: str) -> tuple[cr.Contact, Any, list[str]]:
+    def run(
+        within: str, normal: str = "load = 3e-8", radius: str = "1.0"
+    ) -> tuple[cr.Contact, Any, list[str]]:
         file = tmp_path / "scene.toml"
-        file.write_text(scene_text(HEXAGONAL + within, normal=normal, more=path))
+        file.write_text(scene_text(HEXAGONAL + within, normal, path, radius))
         scene = cr.read_scene(file)
         contact = scene.press()
         return contact, scene.compute(contact)[1].found[0], list(scene.cautions(contact))
@@ -116,6 +117,10 @@ def test_an_array_for_the_largest_load_of_a_path(tmp_path: Path) -> None:
     assert grown.losses[-1] == pytest.approx(whole.losses[-1], rel=1e-12)
     *_, narrow = run("within = 0.0067")
     assert [each for each in narrow if "under the loads of [path] contact reaches the rim" in each]
+    long = "within = 0.0102\nheight_std = 2e-6\nseed = 3"
+    for load, ended in (("1e-9", True), ("1e-7", False)):  # at 1e-7 [normal] has warned of it
+        *_, said = run(long, f"load = {load}", "[inf, 1.0]")
+        assert any(each.startswith("under the loads of [path]") for each in said) == ended
 
 
 STEADY = FRICTION + "[steady]\nreference = 1e60\n"

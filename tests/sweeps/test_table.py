@@ -86,10 +86,17 @@ def test_rows_are_those_of_single_scenes() -> None:
             assert rows[name][i] == pytest.approx(value, rel=0.0, abs=rounding), name
 
 
-def test_rows_together_are_those_of_scenes_one_by_one() -> None:
+@pytest.mark.parametrize(
+    "cycle",
+    [
+        {"maximum_fraction": [0.37, 1.0], "minimum_fraction": [-0.37, 0.1]},
+        {"displacement": [1e-6, 2e-6]},  # not together
+    ],
+)
+def test_rows_together_are_those_of_scenes_one_by_one(cycle: dict[str, list[float]]) -> None:
     """Where only numbers of contacts and cycles are asked for, scenes are computed together."""
     contents = {k: v for k, v in ALL.items() if k not in ("shear", "history", "steady")}
-    contents["cycle"] = {"maximum_fraction": [0.37, 1.0], "minimum_fraction": [-0.37, 0.1]}
+    contents["cycle"] = cycle
     asked = [f"normal.{each}" for each in NORMAL] + [f"cycle.{each}" for each in CYCLE]
 
     def measured(*more: str) -> dict[str, Any]:
@@ -97,6 +104,7 @@ def test_rows_together_are_those_of_scenes_one_by_one() -> None:
         return swept(contents | {"sweep": sweep}).read()
 
     together, alone = measured(), measured("crowding")
+    assert ("cycle.loss_1e-06" in alone) == ("displacement" in cycle)
     assert set(alone) - set(together) == {"crowding"}
     for name, values in together.items():
         if values.dtype.kind == "U":

@@ -5,20 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
+from pydantic import Field
 
 from convexrough import plots
 from convexrough.contact import Contact
-from convexrough.errors import InputError
+from convexrough.errors import InputError, blamed_on
 from convexrough.friction.cycle import Loop, loops
 from convexrough.friction.fretting import Fretting, fretting, fretting_columns
 from convexrough.friction.path import history
 from convexrough.friction.shear import shear
 from convexrough.friction.steady import cycles
 from convexrough.run.stage import Columns, Labels, Result, Stage, Steps, Summary, heads, limit
-from convexrough.run.values import Fractions, Mistake, Shares, Whole, expected
+from convexrough.run.values import ALSO_ONE, Fractions, Mistake, Positive, Shares, Whole, expected
 from convexrough.scene.rings import one_of_each_ring
 
 #: Largest number of asperities whose loops are computed, unless the scene file names them.
@@ -75,6 +76,7 @@ class CycleStage(Stage):
     """The largest and smallest shear forces of steady cycles, as fractions of f P.
 
     minimum_fraction : default: minus the largest force
+    displacement : displacement amplitudes of symmetric cycles, in place of forces
     loop_points : approximate number of points of a loop; the default is smaller for many
         asperities, and where order fails
     loop_asperities : indices of asperities whose loops are computed, or "all"; default: one
@@ -87,8 +89,14 @@ class CycleStage(Stage):
                "smooth_normalised", "balance_defect", "sliding", "partial",
                "undecided")  # fmt: skip
 
-    maximum_fraction: Fractions
+    alternatives = ("maximum_fraction", "displacement")
+    needs: ClassVar[Mapping[str, str]] = {"minimum_fraction": "maximum_fraction"}
+
+    maximum_fraction: Fractions = Field(default=[])
     minimum_fraction: Fractions | None = None
+    displacement: Annotated[
+        list[Positive], expected("a positive number, or a list of these", bool), ALSO_ONE
+    ] = Field(default=[])
     loop_points: Points | None = None
     loop_asperities: Chosen | None = None
 
@@ -100,6 +108,8 @@ class CycleStage(Stage):
 
     @property
     def labels(self) -> Labels:
+        if self.displacement:
+            return {"prescribed_displacement": self.displacement}
         return {"maximum_fraction": self.maximum_fraction, "minimum_fraction": self.lowest}
 
     def mistakes_within(self) -> Iterator[Mistake]:
@@ -121,8 +131,12 @@ class CycleStage(Stage):
                 raise InputError(what, found=index, expected=f"an index from 0 to {count - 1}")
 
     def compute(self, contact: Contact) -> CycleResult:
-        f_p = limit(contact)
-        found = cycles(contact, f_p * np.array(self.maximum_fraction), f_p * np.array(self.lowest))
+        if self.displacement:
+            with blamed_on("[cycle]"):
+                found = cycles(contact, displacement=self.displacement)
+        else:
+            ranges = np.array([self.maximum_fraction, self.lowest])
+            found = cycles(contact, *limit(contact) * ranges)
         return CycleResult(self, contact, tuple(found))
 
 
@@ -186,9 +200,10 @@ class CycleResult(Result):
         return {**super().tables(), "loop": curves, "fretting": worn}
 
     def headings(self) -> Mapping[str, str]:
-        """The headings, without those of W/W0 if the energy scale of a smooth sphere is unknown."""
-        known = not math.isnan(self.known[0]["smooth_normalised"])
-        return {key: it for key, it in self.printed.items() if known or "_normalised" not in key}
+        """The headings of columns in the rows, without W/W0 if there is no smooth reference."""
+        row, printed = self.known[0], self.printed.items()
+        known = not math.isnan(row["smooth_normalised"])
+        return {it: head for it, head in printed if it in row and (known or "_norm" not in it)}
 
     def lines(self) -> list[str]:
         if "loss_normalised" in self.headings():

@@ -28,6 +28,9 @@ EACH = {"heights": "height", "tip_radii": "tip_radius", "positions": "position"}
 SHARED = ("sphere_radius", "contact_modulus", "poisson_ratio", "friction", "load", "approach",
           "maximum", "minimum", "force")  # fmt: skip
 
+#: What the key `by` may be.
+ASKED = f"a list of some of: {', '.join(EACH)}; those by {', '.join(SHARED[:4])} are always given"
+
 
 class GradientStage(Stage):
     """The result to differentiate, and the parameters.
@@ -43,10 +46,9 @@ class GradientStage(Stage):
 
     of: Annotated[str, one_of(LETTERS)]
     fraction: Share | None = None
-    by: Annotated[
-        list[str],
-        expected(f"a list of some of: {', '.join(EACH)}", lambda it: bool(it) and {*it} <= {*EACH}),
-    ] = Field(list(EACH))
+    by: Annotated[list[str], expected(ASKED, lambda it: bool(it) and {*it} <= {*EACH})] = Field(
+        list(EACH)
+    )
     holding: Annotated[Holding, expected('"load" or "approach"')] | None = None
 
     @property
