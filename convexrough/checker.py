@@ -579,13 +579,15 @@ def sentence(document: Any) -> str:
         return ", ".join(f"{some['status'].count(it)} {it}" for it in (*statuses, "undecided"))
 
     bounds = [numbers(pair, "claims loads", 2) for pair in claims["loads"]]
-    largest = max(high for _, high in bounds) or Fraction(1)
-    widest = min(max(high - low for low, high in bounds) / largest, Fraction(1))
-    known = Context(1, ROUND_CEILING).create_decimal(float(widest))
+    widest, largest = max(high - low for low, high in bounds), max(low for low, _ in bounds)
+    known = "without a bound relative to the largest"
+    if largest > 0 or widest == 0:
+        part = (widest / (largest or 1)).as_integer_ratio()
+        known = f"known to {Context(1, ROUND_CEILING).divide(*part):g} of the largest"
     alone = "the only one" if claims["scope"] == "global" else "the only one inside its box"
     lines = [
         f"proved: under the {control} {float.fromhex(value):.10g} there is a solution, {alone}",
-        f"{counts(claims, 'contact', 'open')}, loads known to {known:g} of the largest",
+        f"{counts(claims, 'contact', 'open')}, loads {known}",
     ]
     for entry, claim in zip(document["sheared"], claims["shear"], strict=True):
         lost = "no loss is proved"

@@ -4,6 +4,7 @@ import ast
 import json
 import math
 import random
+import re
 import subprocess
 import sys
 from copy import deepcopy
@@ -83,6 +84,15 @@ def test_it_runs_alone(document: Any, tmp_path: Path) -> None:
     none = tmp_path / "none.json"
     missing = f"unreadable: {none}: No such file or directory\n"
     assert said(copy, none, "-I", "-S") == (2, "", missing)
+
+
+@pytest.mark.parametrize(
+    ("touching", "said"), [(1, r"known to \de\+30\d of"), (6, "without a bound relative to")]
+)
+def test_wide_bounds_are_relative_to_a_proved_load(few: Any, touching: int, said: str) -> None:
+    weak = deepcopy(few)
+    weak["claims"]["loads"][:touching] = [["0x0.0p+0", (1e300).hex()]] * touching
+    assert re.search(said, checker.check(weak))
 
 
 @pytest.mark.parametrize(
