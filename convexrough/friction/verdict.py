@@ -78,8 +78,8 @@ class ShearVerdict(Claim, Record):
         if by_forces and (count := int(close[self.wrongly_sticking].sum())):
             yield (
                 f"{count:,} of the shear forces, on asperities proved to slide, are between "
-                f"{100 * CLAIMS_SLIDING:g} % and {100 * WITHIN:g} % below f P_i: without a column "
-                "status these asperities count as claimed to stick"
+                f"{100 * CLAIMS_SLIDING:g} % and {100 * WITHIN:g} % below f P_i: these asperities "
+                "count as claimed to stick, unless a column status says sliding"
             )
 
     @property
