@@ -23,7 +23,7 @@ from convexrough.scene.neighbours import nearest_distances
 from convexrough.scene.scene import Scene
 from convexrough.surface.map_arrays import steps
 from convexrough.tabular.columns import bound
-from convexrough.tabular.roles import Reading
+from convexrough.tabular.roles import COLUMNS, Reading
 from convexrough.tabular.table import ReadTable, read_table, refuse
 from convexrough.tabular.units import bare, unit
 from convexrough.verdict.placing import Placing, unused
@@ -82,6 +82,7 @@ class Claimed(NamedTuple):
     status: NDArray[np.str_] | None  # (n,) the statuses in the file, if it has such a column
     note: str  # how the file was read, on one line
     explained: list[str]  # how each column was read
+    numbers: list[str]  # the known names of the columns of numbers that were read
 
 
 def read_loads(path: Path, scene: Scene, how: Manner) -> Claimed:
@@ -185,7 +186,8 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
     read_how = [*(_not_compared(table, values > floor) if name == "load" else ()), place.how]
     read_how += () if summed else _of_another_scene(table, scene, owners)
     note = ", ".join(filter(None, [table.style, *units, *read_how]))
-    return Claimed(path, frozen(forces), status, f"{path}: {note}", [*_explained(table), *read_how])
+    explained, numbers = [*_explained(table), *read_how], [it for it in columns if COLUMNS[it].kind]
+    return Claimed(path, frozen(forces), status, f"{path}: {note}", explained, numbers)
 
 
 def _negative(
