@@ -87,7 +87,7 @@ class Claimed(NamedTuple):
 
 def read_loads(path: Path, scene: Scene, how: Manner) -> Claimed:
     """Loads [force] from a file, of rows that are assigned to asperities by position, else by an
-    index, else in order; pressures are integrated over the points nearest to each asperity."""
+    index, else in order; pressures at points are summed by asperity."""
     return _read(path, scene, "load", how, how.floor)
 
 
