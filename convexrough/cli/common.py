@@ -59,7 +59,8 @@ solver_option = option(
 
 #: The options for the place and the form of results, in the order of the help.
 OPTIONS = {
-    "proof": option("--proof", "Write proof.json, which `convexrough check` verifies."),
+    "proof": option("--proof", "Write proof.json, which `convexrough check` verifies. It is a "
+                    "proof about the solution, not about given loads."),
     "html": option("--html", "Also write slider.html, an interactive page."),
     "formats": option("--formats LIST", "Formats of figures: png, svg, pdf.",
                       default="png", show_default=True, callback=_formats),
@@ -148,10 +149,11 @@ class Output:
         found.save(folder / "proof.json")
         return found
 
-    def say_proof(self, proof: Proof | None, folder: Path, status: int) -> int:
-        """Print what is proved; return `status`, but NOT_CERTIFIED if --proof finds no proof."""
+    def say_proof(self, proof: Proof | None, folder: Path, status: int, about: str = "") -> int:
+        """Print what is proved, and what the file is `about`; return `status`, but NOT_CERTIFIED if
+        --proof finds no proof."""
         if proof is not None:
-            click.echo(f"{proof.proved}\nwritten  {folder / 'proof.json'}", err=self.as_json)
+            click.echo(f"{proof.proved}\nwritten  {folder / 'proof.json'}{about}", err=self.as_json)
         return NOT_CERTIFIED if self.proof and proof is None else status
 
 

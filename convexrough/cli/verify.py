@@ -201,7 +201,8 @@ def verify(
     if not all(claim.holds for claim in claims):
         status, reasons = common.NOT_CERTIFIED, filter(None, map(report.reason, claims))
         common.say_aside("warning", f"not certified: {', '.join(reasons)}")
-    return output.say_proof(proof, output.out or Path(), status)
+    of_solution = ", a proof about the loads of the solution, not about the given ones"
+    return output.say_proof(proof, output.out or Path(), status, of_solution)
 
 
 @contextmanager
@@ -231,5 +232,8 @@ def _proof(file: SceneFile, loads: Array, claim: Claim, scene: Path) -> Proof:
         except ProofError as error:
             if claim.holds or claim.solution is None or not claim.solution.certificate.all_proved:
                 raise
-            far = "nothing is proved: the given loads are too far from the solution"
-            raise ProofError(far) from error
+            raise ProofError(
+                "no exact proof is found from the given loads, which are not accepted; statuses in "
+                "the report are proved by certificates; `convexrough run --proof` starts from the "
+                "solution"
+            ) from error
