@@ -153,11 +153,11 @@ def verify(
         manner = _manner(units=file.scene.units, convert=file.convert, shared=shared, **how)
         read = [read_loads(loads, file.scene, manner)]
         read += [read_shear_forces(shear, file.scene, manner)] if shear is not None else []
-        about = report.describe_scene(file.scene)
         if unread := manner.scales.keys() - {name for each in read for name in each.numbers}:
             found = ", ".join(f"{name}={manner.scales[name]:.15g}" for name in sorted(unread))
             known = ", ".join({name: "" for each in read for name in each.numbers})
             raise InputError("--scale", found=found, expected=f"a column that is read: {known}")
+        about = report.describe_scene(file.scene)
         if explain:
             lines = [line for each in read for line in (f"{each.path}:", *each.explained, "")]
             output.say({"read": [*lines, *about]}, [*lines, *about])

@@ -31,6 +31,7 @@ def verdict_summary(claims: Sequence[Claim]) -> dict[str, Any]:
                  "total_prescribed", "within")  # fmt: skip
         found = ((name, getattr(claim, name)) for name in names)
         summary[key] = {name: it.tolist() if np.ndim(it) else it for name, it in found}
+        summary[key][f"{claim.one}_error"] = float(claim.errors.max())
     return summary | {"asperities": rows_of(asperity_columns(claims))}
 
 
@@ -73,9 +74,22 @@ def _proved(claim: Claim) -> str:
 
 
 def _size(claim: Claim) -> str:
-    size = f"{bound(100 * claim.error)} %" if claim.error > PERCENT else bound(claim.error)
+    """The largest error, rounded up but not above an allowed error that it does not exceed."""
+    if math.isinf(most := float(claim.errors.max())):
+        return "an unknown size"
     smaller = claim.nearby() is not None and claim.largest < np.abs(claim.values).max()
-    return f"{size} of the largest {claim.one}{' of the solution' if smaller else ''}"
+    which = f"{claim.one} of the solution" if smaller else claim.one
+    if most > 0 == claim.largest:
+        size = f"{bound(most)} {claim.of.units.force}".rstrip()
+        return f"{size} while the largest {'' if smaller else 'given '}{which} is 0"
+    shown = float(bound(claim.error))
+    if claim.near_enough:
+        shown = min(shown, claim.within)
+    return f"{_fraction(shown)} of the largest {which}"
+
+
+def _fraction(value: float) -> str:
+    return f"{100 * value:.12g} %" if value > PERCENT else f"{value:.12g}"
 
 
 def describe_claim(claim: Claim, others: str = "") -> list[str]:
@@ -106,7 +120,7 @@ def describe_claim(claim: Claim, others: str = "") -> list[str]:
     lines += labelled([("undecided", str(len(claim.undecided) or "none"))])
     lines += table(claim.undecided)
     lines += labelled([(f"{claim.one} error", _off(claim))])
-    lines += table(claim.off) if math.isfinite(claim.error) else []
+    lines += table(claim.off) if math.isfinite(claim.errors.max()) else []
     lines += labelled([(f"total {claim.one}", _total(claim, claim.of.units.force))])
     if len(claim.suspects):
         lines += [*labelled([("suspects", "most likely first")]), *table(claim.suspects)]
@@ -133,7 +147,8 @@ def junit(found: Sequence[Claim] | ConvexroughError, files: str) -> bytes:
     for name, text in cases.items():
         case = ElementTree.SubElement(suite, "testcase", classname=suite.get("name", ""), name=name)
         if text:
-            ElementTree.SubElement(case, kind, message=name).text = text
+            first = f"{name}: {text.splitlines()[0]}"
+            ElementTree.SubElement(case, kind, message=first).text = text
     suite.set("tests", str(len(suite)))
     for each in ("failure", "error"):
         suite.set(f"{each}s", str(len(suite.findall(f"*/{each}"))))
@@ -161,10 +176,10 @@ def _findings(claim: Claim) -> dict[str, str]:
 def _off(claim: Claim) -> str:
     noun = claim.one if len(claim.off) == 1 else claim.many
     beyond = f"; exceeded by {len(claim.off):,} {noun}" if len(claim.off) else ""
-    allowed = f"{100 * claim.within:g} %" if claim.within > PERCENT else f"{claim.within:g}"
-    if math.isinf(claim.error):
-        return f"no bound is proved ({allowed} allowed)"
-    return f"at most {_size(claim)} ({allowed} allowed{beyond})"
+    allowed = f"{_fraction(claim.within)} allowed"
+    if math.isinf(claim.errors.max()):
+        return f"no bound is proved ({allowed})"
+    return f"at most {_size(claim)} ({allowed}{beyond})"
 
 
 def _total(claim: Claim, unit: str) -> str:

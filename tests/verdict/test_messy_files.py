@@ -688,12 +688,14 @@ def test_findings_as_junit(case: Case) -> None:
     assert list(cases) == ["loads: contact set", "loads: undecided", "loads: off", "loads: total"]
     assert suite("a.xml").get("failures") == str(sum(len(each) for each in cases.values()))
     assert f"{np.argmax(case.loads)} at (" in str(cases["loads: contact set"][0].text)
+    assert str(cases["loads: off"][0].get("message")).startswith("loads: off: at most ")
     again = case.verify({"load": case.loads[1:]}, "--junit", "a.xml")
     assert again.refuses("a.xml: exists already")
     outcome = case.verify({"load": case.loads[1:]}, "--junit", "b.xml")
     assert [suite("b.xml").get(each) for each in ("tests", "failures", "errors")] == [*"101"]
     said = str(suite("b.xml")[0][0].text)
     assert f"rows: found {len(case.loads) - 1}" in said
+    assert suite("b.xml")[0][0].get("message") == f"input: {said.splitlines()[0]}"
     assert said in outcome.err
     for wrong in (
         ["--junit=b.xml"],

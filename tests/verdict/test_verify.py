@@ -51,6 +51,32 @@ def test_what_is_right(command: Any, contact: cr.Contact, scene: str) -> None:
     assert said[7].endswith("(as prescribed)" if scene == "b.toml" else "(none prescribed)")
 
 
+def test_a_bound_is_not_rounded_up_above_the_limit(command: Any, contact: cr.Contact) -> None:
+    outcome = command("verify", "a.toml", claim(contact, factor=1.01), "--within", "0.0100001")
+    assert outcome.status == 0
+    assert "correct to within 1.00001 % of the largest load of the solution\n" in outcome.out
+    assert " 1.00001 % of the largest load of the solution (1.00001 % allowed)\n" in outcome.out
+
+
+def test_errors_relative_to_zero(command: Any, contact: cr.Contact) -> None:
+    Path("c.toml").write_text(scene_text(WITHIN, "approach = -5e-5", MORE))
+    largest = float(contact.loads.max())
+    floor, of_solution = ("--floor", "1"), "load of the solution"
+    for scene, factor, options, which, result in (
+        ("a.toml", 0.0, (), "given load", "contact set wrong"),
+        ("c.toml", 1.0, (), of_solution, "contact set wrong"),
+        ("c.toml", 1.0, floor, of_solution, r"contact set proved; errors of up to \S+ N while the"),
+    ):
+        asked = ("verify", scene, claim(contact, factor=factor), *options)
+        outcome = command(*asked)
+        assert re.search(f"^result            {result}", outcome.out, re.M)
+        said = rf"(\S+) N while the largest {which} is 0 \(1 % allowed; exceeded by 37 loads"
+        (shown,) = re.findall(f"^load error        at most {said}", outcome.out, re.M)
+        verdict = json.loads(command(*asked, "--json").out)["verdict"]
+        assert verdict["error"] is None
+        assert largest <= verdict["load_error"] <= float(shown) <= 1.01 * largest
+
+
 def test_a_wrong_set(command: Any, contact: cr.Contact) -> None:
     loads = claim(contact, {36: 0.0, 50: 1e-9})
     outcome = command("verify", "a.toml", loads)
