@@ -228,6 +228,8 @@ def _proof(file: SceneFile, loads: Array, claim: Claim, scene: Path) -> Proof:
         if claim.holds:  # claimed loads may be too inaccurate for an exact proof
             loads = solve(file.problem(), start=loads).loads
         try:
+            if file.load is not None and not loads.any():
+                raise ProofError("no load is given")
             return prove(file.scene, loads, **control)
         except ProofError as error:
             if claim.holds or claim.solution is None or not claim.solution.certificate.all_proved:
