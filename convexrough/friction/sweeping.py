@@ -71,6 +71,7 @@ NEAR = 9  # where (7) proves (6) far away, (6) is computed for NEAR times as man
 NEAR_ALIKE = 5  # the same number for equal weights
 SEARCHES = 15  # systems solved for weights; each leaves out earlier neighbours of negative weight
 SAMPLE = 300  # the linear program considers about twice as many asperities
+TURN = 0.4  # angle from the two lines of a corner to a line perpendicular to the dipole
 DIRECTIONS = 256  # directions in which the extent of the support is computed
 ROWS, NUMBERS = 2**14, 2**18  # asperities treated together, and float64 numbers in an array
 
@@ -180,15 +181,19 @@ class _Swept:
         count = min(count, len(self.support) - 1)
         workers = threads.worthwhile(len(which) * count)
         _, found = self._tree.query(self.plane[which], count + 1, workers=workers)
-        nearest = self.support[found]
-        itself = np.argsort(nearest == which[:, None], axis=1, kind="stable")
-        return np.asarray(np.take_along_axis(nearest, itself[:, :count], axis=1))
+        nearest = self.support[found]  # an asperity itself comes first, at the distance 0
+        own = nearest[:, :1] == which[:, None]
+        return np.asarray(np.where(own, nearest[:, 1:], nearest[:, :-1]))
 
     def potentials(self, charges: Indices, places: Indices) -> Array:
         """Potentials of unit charges at places; at a charge itself, the potential of its shell."""
-        apart = self.places[charges] - self.places[places]
-        squares = apart.real**2 + apart.imag**2
-        return np.asarray(1.0 / np.where(charges == places, self.shells[charges], np.sqrt(squares)))
+        apart, along_y = (axis[charges] - axis[places] for axis in self.plane.T)
+        apart *= apart
+        along_y *= along_y
+        apart += along_y
+        np.sqrt(apart, out=apart)
+        np.copyto(apart, self.shells[charges], where=charges == places)
+        return np.asarray(1.0 / apart)
 
     def outside(self, which: Indices) -> Array:
         """(m,) lower bounds on rates by sweeping onto one neighbour; -inf where that fails."""
@@ -297,19 +302,26 @@ class _Swept:
             return np.asarray(np.abs((weights * values).sum(axis=1)))
 
         first, here = (weights * d).sum(axis=1), self.places[which]
-        size, square = np.abs(first), total(apart**2)
-        behind = np.maximum((first.conj() * here).real - self._least_along(first), 0.0)
-        behind += self.lost * total(apart) * self.extent
+        size, square, rounding = np.abs(first), total(apart**2), self.lost * total(apart)
+
+        def behind(direction: NDArray[np.complex128]) -> Array:
+            past = (direction.conj() * here).real - self._least_along(direction)
+            return np.asarray(np.maximum(past, 0.0) + rounding * self.extent)
+
+        m = behind(first)
+        turned = first * np.exp(1j * TURN), first * np.exp(-1j * TURN)
+        ahead = size * r * np.sin(TURN) - np.maximum(*map(behind, turned))
         third = 3 / 8 * total(apart**2 * d) + 5 / 8 * total(d**3)
         with np.errstate(divide="ignore", invalid="ignore"):
             rest = total(apart**4 / np.maximum(r[:, None] - apart, 0.0))
-            turned = -(weights * d**2).sum(axis=1) * (first.conj() / size) ** 2
-            across = turned.real * (1.0 - 2.0 * (behind / size / r) ** 2) - np.abs(turned.imag)
-        edge = (turned.real >= 0) & (size * r >= 1.5 * turned.real)
-        second = np.where(edge, np.fmax(across, -np.abs(turned)), -total(d**2))
-        s = square / 4 + 3 / 4 * second - behind - (third + rest) / r
-        # Where s > square / 64, s / 2 is far larger than the rounding error of s.
-        return np.asarray(np.where(s > square / 64, s / 2 / self.extent**2, 0.0))
+            s = -(weights * d**2).sum(axis=1) * (first.conj() / size) ** 2
+            across = s.real * (1.0 - 2.0 * (m / size / r) ** 2) - np.abs(s.imag)
+        edge = (s.real >= 0) & (size * r >= 1.5 * s.real)
+        both = np.maximum(-m, np.where(ahead >= 0, ahead, -np.inf)) - 3 / 4 * total(d**2)
+        both = np.where(edge, np.fmax(both, 3 / 4 * across - m), both)
+        kappa = square / 4 + both - (third + rest) / r
+        # Where kappa > square / 64, kappa / 2 is far larger than its rounding error.
+        return np.asarray(np.where(kappa > square / 64, kappa / 2 / self.extent**2, 0.0))
 
     def _ratios(self, which: Indices, near: Indices, weights: Array, seen: Indices) -> Array:
         """(m, k) sum_j w_j A_jk (with the shell's potential if j = k) over A_ik for k in `seen`."""
