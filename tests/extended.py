@@ -24,3 +24,15 @@ def inverse_sums(
             total[0, i] = sums
             total[1, i] = sums - exact(total[0, i])
     return total[0], total[1]
+
+
+def pulled(points: Array, loads: Array, i: int, scale: float) -> list[arb]:
+    """The derivatives of scale sum_j P_j / r_ij with respect to the coordinates of point i."""
+    with ctx.workprec(160):
+        x, y = (exact(points[i]) - exact(points)).T
+        squares = x * x + y * y
+        apart = np.flatnonzero(squares != 0)
+        falling = [-arb(scale) * arb(loads[j]) * squares[j].rsqrt() ** 3 for j in apart]
+        return [
+            sum((a * b for a, b in zip(z[apart], falling, strict=True)), arb(0)) for z in (x, y)
+        ]

@@ -165,8 +165,8 @@ class Gradient(Table, Plottable):
     Attributes that end in `_error` or `_errors` are proved bounds on the errors of the derivatives,
     including all rounding, for the given float64 data of the scene. They are infinite if the
     normal solution is not proved at some load on which the number depends. With more than 1,000
-    loaded asperities and no stored compliance matrix, bounds for positions are also infinite, and
-    in the geometry "closest" those for radii, too. The bound of an infinite derivative, in gross
+    loaded asperities and the influence "scattered", bounds for positions are also infinite, and in
+    the geometry "closest" those for radii, too. The bound of an infinite derivative, in gross
     sliding, is 0.
 
     contact         : the contact on which the number depends

@@ -26,11 +26,11 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from convexrough.arithmetic.balls import Ball, joined, of_rows, where
-from convexrough.arrays import Array, Indices
+from convexrough.arrays import Indices
 from convexrough.errors import InputError
 from convexrough.normal.level import Level
 from convexrough.normal.problem import NormalProblem
-from convexrough.roundoff import ROUNDOFF, SAFETY
+from convexrough.roundoff import SAFETY
 from convexrough.scene.base import along
 
 ZERO = Ball.exact(0.0)
@@ -214,19 +214,14 @@ class Geometry:
         """(m, 2) for each vector P, the sums  -scale sum_j (c_i - c_j) P_j / |c_i - c_j|^3.
 
         scale is 1 / (pi E*) in scaled units. The P are loads (m,) of the asperities `which`. For
-        more than IN_BALLS asperities the sums are computed in float64, and the error bounds are
-        infinite if no compliance matrix is stored.
+        more than IN_BALLS asperities the sums are computed in float64.
         """
         if len(which) <= IN_BALLS:
             return self._in_balls(loads, which)
         A, found = self.problem.influence.restricted(which), []
         for P in loads:
-            size: Array | float = np.inf
-            if A.name == "dense":
-                off = (len(which) + 16) * ROUNDOFF + 4.0 * A.entry_error
-                size = A.falloff(np.abs(P.value) * off + P.error, 2) * A.scale * (1 + SAFETY)
-                size = size[:, None]
-            found.append(Ball.around(A.slopes(P.value), size))
+            errors = A.slope_errors(P.value) + A.falloff(P.error, 2) * A.scale
+            found.append(Ball.around(A.slopes(P.value), errors[:, None] * (1 + SAFETY)))
         return found
 
     def _in_balls(self, loads: Sequence[Ball], which: Indices) -> list[Ball]:

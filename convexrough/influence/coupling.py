@@ -128,7 +128,7 @@ class Influence(Coupling):
     def slopes(self, loads: Array) -> Array:
         """(n, 2) derivatives of (A P)_i with respect to the contact point c_i of asperity i.
 
-        They are -scale sum_j (c_i - c_j) P_j / r_ij^3, without a bound on the rounding error.
+        They are -scale sum_j (c_i - c_j) P_j / r_ij^3; `slope_errors` bounds their errors.
         """
         points, total = self.points, np.empty((len(self), 2))
         for some in _rows(len(self), len(self)):
@@ -137,6 +137,11 @@ class Influence(Coupling):
                 apart = np.subtract.outer(points[some, k], points[:, k])
                 total[some, k] = (weights * apart).sum(axis=1)
         return -self.scale * total
+
+    def slope_errors(self, loads: Array) -> Any:
+        """(n,) bounds on the errors of `slopes`, or one bound for all; infinite if not known."""
+        off = (len(self) + 16) * ROUNDOFF + 4.0 * self.entry_error
+        return self.falloff(np.abs(loads) * off, 2) * self.scale
 
     def separations(self) -> Array:
         """(n,) [length] lower bounds on the distances of asperities to their nearest neighbours."""

@@ -205,9 +205,21 @@ class LatticeInfluence(coupling.Influence):
 
     def slopes(self, loads: Array) -> Array:
         box, places = self._boxed_for(loads)
-        pulls = self._on(box, "pulls", lambda: box.pulls(coupling.cubed))
-        each = [box.convolve_at(places, loads, 1j * pull.spectrum) for pull in pulls]
+        each = [box.convolve_at(places, loads, 1j * pull.spectrum) for pull in self._pulls(box)]
         return -self.scale / self.lattice.spacing**2 * np.stack(each, axis=1)
+
+    def slope_errors(self, loads: Array) -> float:
+        box, _ = self._boxed_for(loads)
+        norm = max(pull.norm for pull in self._pulls(box))
+        error = box.bound(norm, operations=16) * float(np.linalg.norm(loads))
+        # The vector d / |d|^3 changes by at most 2 / |d|^3 times a small change of d.
+        _, _, most, unknown = self._deviations
+        moved = 4.0 * (most + unknown) / self._least**3 * self._kernel.norm**2
+        error += moved * float(np.abs(loads).max(initial=0.0))
+        return 1.01 * error * self.scale / self.lattice.spacing**2
+
+    def _pulls(self, box: SiteBox) -> list[Kernel]:
+        return self._on(box, "pulls", lambda: box.pulls(coupling.cubed))
 
     def separations(self) -> Array:
         if len(self) <= FILLED * math.prod(self.box.shape):
@@ -289,22 +301,29 @@ class LatticeInfluence(coupling.Influence):
         norm = self._kernel.norm * unit / self.lattice.spacing
         return Sliced.of(box, distances, norm, unit, count)
 
-    def _off_sites(self, loads: Array, box: SiteBox, places: Indices) -> Ball:
-        """(n,) changes of sum_j P_j / r_ij by deviations of points from their sites.
-
-        docs/theory/operators-lattice.md, "Points off their sites", derives the expansion.
+    @property
+    def _deviations(self) -> tuple[Array, Array, float, float]:
+        """[spacing] the deviations (n,), (n,) of points from their sites along x and along y, a
+        bound on their size, and one on the errors of these two.
         """
         layout = self.layout
         x, y, unknown = layout.cached(off_sites) if len(self) <= MOST_KEPT else off_sites(layout)
         shrunk = [float(factor) / self.lattice.spacing for factor in self.lattice.shrink]
         x, y = (t * each[self.members] for t, each in zip(shrunk, (x, y), strict=True))
         most = math.hypot(*(float(np.abs(each).max(initial=0.0)) for each in (x, y))) * (1 + 1e-9)
-        unknown = max(shrunk) * unknown + 8 * ROUNDOFF * most
+        return x, y, most, max(shrunk) * unknown + 8 * ROUNDOFF * most
+
+    def _off_sites(self, loads: Array, box: SiteBox, places: Indices) -> Ball:
+        """(n,) changes of sum_j P_j / r_ij by deviations of points from their sites.
+
+        docs/theory/operators-lattice.md, "Points off their sites", derives the expansion.
+        """
+        x, y, most, unknown = self._deviations
         top = float(np.abs(loads).max(initial=0.0))
         if most + unknown == 0.0 or top == 0.0:
             return Ball.exact(np.zeros(len(self)))
         shares = loads / top
-        pulls = self._on(box, "pulls", lambda: box.pulls(coupling.cubed))
+        pulls = self._pulls(box)
 
         def pull(waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
             along, across = (1j * kernel.spectrum[:, each] for kernel in pulls)

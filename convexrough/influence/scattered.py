@@ -95,6 +95,9 @@ class ScatteredInfluence(coupling.Influence):
             return super().slopes(loads)
         return -self.scale * self._double.slopes(loads)
 
+    def slope_errors(self, loads: Array) -> Any:
+        return super().slope_errors(loads) if self._double is None else np.inf
+
     def sums(self, loads: Pair) -> Ball:
         found = self._sums(loads)
         if isinstance(self._sums, MatrixSums) or self._unknown == 0.0:
