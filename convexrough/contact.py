@@ -134,7 +134,8 @@ class Contact(Cached, Table, Plottable):
         """A proof for `convexrough check` and other checkers; its method `save(path)` writes it.
 
         sheared : results of `shear` for this contact, with shear forces 0 < |Q| < f P. For each,
-            the proof includes the state at Q and the loss of the cycle between Q and -Q
+            the proof includes the state at |Q|, of which that at -|Q| is the mirror image, and the
+            loss of the cycle between them
 
         docs/theory/proof-file.md describes the file. Raises InputError for scenes too large for
         exact arithmetic, and ProofError if nothing is proved, for example because the `order` of a

@@ -176,7 +176,8 @@ def shear(
         tangential displacement of distant points
 
     If |Q| or the displacement differs from its value at the onset of gross sliding (f P for |Q|) by
-    at most 16 * 2^-53 of this value, it counts as that value, also in the result.
+    at most 16 * 2^-53 of this value, it counts as that value, also in the result. So does a
+    displacement that is larger by at most 1e-14 of it.
 
     Raises InputError if the scene has no friction, if |Q| exceeds f P, or if |displacement| exceeds
     that at which gross sliding starts; SolverError if a normal problem is not solved.

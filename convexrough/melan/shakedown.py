@@ -94,9 +94,13 @@ class Shakedown(Table, Plottable):
         """What critical asperities do above `factor`: slide as a whole, or open in every cycle."""
         if self.factor == np.inf:
             return None
-        if not self.load_amplitudes.any() or self.factor == self.gross:
+        if not self.load_amplitudes.any():
             return "sliding"
         p, t = self.load_amplitudes, self.force_amplitudes / checks.friction(self.scene.friction)
+        if self.factor == self.gross:  # where P - |T| is 0, sliding as a whole needs a force
+            heights = np.abs(self.force / checks.friction(self.scene.friction) + self.factor * t)
+            critical = int(np.argmin(self.load + self.factor * p - heights))
+            return "sliding" if heights[critical] > SAFETY * self.load else "opening"
         fall, opens = _fall(p, t), float((-p).max())
         return "opening" if fall <= opens * (1 + SAFETY) else "sliding"
 

@@ -116,7 +116,8 @@ def shear_vector(
         raise InputError("solver", found=repr(solver)[:60], expected=expected)
     friction = checks.friction(contact.scene.friction)
     Q = _vector(force)
-    size = float(checks.bearable("force", np.hypot(*Q), friction * contact.load))
+    size = checks.finite("force", float(np.hypot(*Q)))
+    checks.bearable("force", size, friction * contact.load)
     if contact.load == 0.0:
         return _unmoved(contact, solver.name)
     problem = contact.cached(FrictionProblem)

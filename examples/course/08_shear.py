@@ -58,7 +58,7 @@ def needed(forces: Array) -> Array:
     return np.asarray(own_displacement(forces) + ratio * (A @ forces)[touching])
 
 
-Q = 0.5 * limit
+Q = 0.5 * limit  # any part above 0 and below 1
 shares = needed(Q * pressed.loads / pressed.load)
 print(f"needed displacements: from {shares.min():.2e} to {shares.max():.2e}")
 assert shares.max() > 1.2 * shares.min()

@@ -252,7 +252,7 @@ shaded = cr.Scene(
 )
 heavy = cr.press(shaded, approach=1.4).load
 loads = [cr.press(shaded, load=part * heavy).loads[0] for part in (0.6, 0.8, 1.0)]
-failing = cr.load_path(shaded, loads=[0.8 * heavy, heavy], forces=[0.0, 0.2 * heavy])
+failing = cr.load_path(shaded, loads=[0.8 * heavy, heavy], forces=[0.0, 0.4 * FRICTION * heavy])
 print("load of the shaded summit:", ", ".join(f"{load:.2e}" for load in loads))
 print(f"order: of the array {path.order}; with the shaded summit {failing.order}")
 assert loads[2] < loads[1]

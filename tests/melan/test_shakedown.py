@@ -108,6 +108,11 @@ def test_a_limit_is_at_most_gross_sliding() -> None:
     assert limit.limited_by == "sliding"
     limit = cr.shakedown(PAPER, load=P, load_amplitudes=rises, force_amplitudes=[0.0, 0.0])
     assert (limit.factor, limit.limited_by) == (np.inf, None)
+    equal = cr.Scene(np.inf, PAPER.asperities, PAPER.material, 0.5)  # all open at the load 0
+    for forces, what in (([0.0, 0.0], "opening"), ([0.0, 0.05 * P], "sliding")):
+        swing = {"load_amplitudes": [0.1 * P, -0.1 * P], "force_amplitudes": forces}
+        limit = cr.shakedown(equal, load=P, **swing)
+        assert (limit.factor == limit.gross, limit.limited_by) == (True, what)
     swing = {"load_amplitudes": [0.1 * P, 0.0], "force_amplitudes": [0.02 * P, 0.0]}
     assert cr.shakedown(PAPER, load=P, **swing).factor == np.inf
 
