@@ -27,6 +27,7 @@ from convexrough.tabular.arrays import reading
 from convexrough.tabular.roles import Reading, named_columns
 from convexrough.tabular.table import few
 from convexrough.tabular.toml_slips import explained
+from convexrough.tabular.units import parsed
 
 if TYPE_CHECKING:
     from convexrough.run.stage import Result, Stage
@@ -164,7 +165,8 @@ def read_study(path: Path) -> tuple[Study, str]:
 
 def _one_unit(path: Path, own: str, named: str) -> None:
     """Raise InputError unless `own`, the unit of a map's summits, is the scene's unit `named`."""
-    if own != named:
+    here, there = (parsed(unit) if unit else None for unit in (own, named))
+    if own != named and not (here and there and here.into(there) == 1):
         found = f"summits of a map {f'in {own}' if own else 'without a unit'}"
         expected = f'{named}, as in {path}: surface.to_unit("{named}")'
         if not own:

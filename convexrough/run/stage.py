@@ -184,7 +184,8 @@ class Result(Record):
 
     def doubts(self) -> Iterator[str]:
         """The reasons why this result is not certified."""
-        if unsure := sum(row.get("undecided", 0) for row in self.known):
+        loaded = (row for row in self.known if row.get("load") != 0)  # at 0 one just touches
+        if unsure := sum(row.get("undecided", 0) for row in loaded):
             many = "status" if unsure == 1 else "statuses"
             yield f"not certified: {unsure} {many} in {self.name} undecided"
         if not self.orders <= {"proved", "proved for one step"}:

@@ -54,7 +54,7 @@ SAME = 1e-6
 _SAID = re.compile(r"[#%;\s]*(width|height|value units?)\s*[:=]\s*(.*?)\s*", re.I)
 #: A line of the header of an ESRI grid, such as "cellsize 0.5".
 _ESRI = re.compile(
-    r"(ncols|nrows|[xy]llc\w+|cellsize|nodata_value)\s+(-?\d+\.?\d*(?:e[+-]?\d+)?)$", re.I
+    r"(ncols|nrows|[xy]llc\w+|cellsize|d[xy]|nodata_value)\s+(-?\d+[.,]?\d*(?:e[+-]?\d+)?)$", re.I
 )
 _COMMENT = re.compile(f"{COMMENT.pattern}|{_SAID.pattern}|{_ESRI.pattern}", re.I)
 _LENGTH = re.compile(r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(.*)")
@@ -236,14 +236,16 @@ def _matrix(path: Path, table: TextTable, width: int) -> HeightGrid:
     for match in filter(None, map(_SAID.fullmatch, table.comments)):
         said[match[1].lower().rstrip("s")] = match[2]
     if pairs := [line.groups() for line in map(_ESRI.match, table.comments) if line]:
-        esri = {name.lower(): float(value) for name, value in pairs}
+        esri = {name.lower(): float(value.replace(",", ".")) for name, value in pairs}
         shape, once = (esri.get("nrows"), esri.get("ncols")), len(esri) == len(pairs)
-        if said or shape != heights.shape or "cellsize" not in esri or not once:
+        pixel = [esri[name] for name in ("cellsize", "cellsize", "dx", "dy") if name in esri]
+        if said or shape != heights.shape or len(pixel) != 2 or not once:
             found = ", ".join([*said, *map(" ".join, pairs)])
-            expected = "nrows {} and ncols {}, a cellsize, each once".format(*heights.shape)
+            expected = "nrows {} and ncols {}, cellsize or dx and dy, each once"
+            expected = expected.format(*heights.shape)
             raise InputError("header", found=found, expected=expected)
         holed = np.where(heights == esri.get("nodata_value"), np.nan, heights)
-        return HeightGrid(holed[::-1], (esri["cellsize"],) * 2)  # from the top down
+        return HeightGrid(holed[::-1], (pixel[0], pixel[1]))  # from the top down
     sizes = [_LENGTH.fullmatch(said.get(name, "")) for name in ("width", "height")]
     value_unit = said.get("value unit", "")
     if sizes == [None, None]:

@@ -254,7 +254,8 @@ def _headed(
             if 2 * sum(style.number(cell) is not None for cell in row.cells) >= len(row.cells):
                 there = f"row {rows[first].number}"
                 expected = f"{width} heights, as in {there}, or text; or delete the lines above "
-                expected += f"{there} and give --pixel, --unit and --height-unit"
+                expected += f"{there} (if y falls from row to row, reverse the rows) and give "
+                expected += "--pixel, --unit and --height-unit"
                 raise InputError(f"row {row.number}", found=shortened(row.text), expected=expected)
         return _headed(rows[first:], titles, style, known, is_map)
     line, names, rows = rows[place], headers[place], rows[place + 1 :]

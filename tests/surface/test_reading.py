@@ -210,9 +210,14 @@ WRONG: list[tuple[str, dict[str, Any], str]] = [
     ("Height [nm]\n@", ONE, r"comments: found Height \[nm\], expected "),
     ("0.5 1.5 no 2.5\n@", ONE, "row 1: found 0.5 1.5 no 2.5, expected 9 heights, as in row 2, or"),
     (f"{KEYENCE}{matrix(separator=',')}", ONE, 'row 3: found "Horizontal","9", .*delete the lines'),
-    ("dx 0.5\nNODATA_value -9999\n@", ONE, "row 1: found dx 0.5, .* give --pixel, --unit"),
+    (
+        "step 0.5\nNODATA_value -9999\n@",
+        ONE,
+        "row 1: found step 0.5, .* reverse the rows.* --pixel",
+    ),
     (ESRI.replace("7", "8"), {}, "header: found ncols 9, nrows 8, .*expected nrows 7 and ncols 9"),
-    (ESRI.replace("cellsize 2.5\n", ""), ONE, "header: .*, a cellsize, each once"),
+    (ESRI.replace("cellsize 2.5\n", ""), ONE, "header: .*, cellsize or dx and dy, each once"),
+    (ESRI.replace("cellsize 2.5\n", "dx 1\n"), ONE, "header: .*, cellsize or dx and dy, each once"),
     (f"cellsize 2\n{ESRI}", {}, "header: found cellsize 2, .*, cellsize 2.5, .* each once"),
     (f"# Width: 9 m\n# Height: 7 m\n{ESRI}", {}, "header: found width, height, ncols"),
     (ESRI, {"pixel": 2.0}, "pixel: found 2 by 2, expected 2.5 by 2.5, as the file states"),
@@ -291,6 +296,8 @@ def test_an_esri_grid(tmp_path: Path, width: int) -> None:
     assert (surface.pixel, surface.comments) == ((2.5, 2.5), ())
     assert_array_equal(surface.filled_pixels, (heights == 0)[::-1])
     assert_array_equal(surface.heights[3, :2], heights[3, :2])
+    sides = content.replace("cellsize 2.5", "dy 2,5\ndx 0,5")
+    assert raw(tmp_path / "b.asc", sides, unit="m", fill=True).pixel == (0.5, 2.5)
     listed = raw(tmp_path / "a.txt", "nrows 3\nx,y,z\n0,0,1\n1,1,3\n2,2,2\n", fill=True)
     assert listed.comments == ("nrows 3",)
 
