@@ -150,6 +150,8 @@ def _forked(folder: Path, arguments: list[str], limit: int | None) -> int:
             resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
         status = 99
         status = cli.main(arguments)
+    except KeyboardInterrupt:  # as the command begins or ends: `__main__` takes these
+        status = 130
     except BaseException:
         import traceback
 
