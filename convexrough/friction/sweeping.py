@@ -59,7 +59,7 @@ def corner(d: NDArray[np.complex128]) -> list[Array]:
 #: of the neighbours decides what is outward. They are tried until the bound 1 - q_i suffices. A try
 #: also uses the asperities that determined q_i in earlier tries.
 TRIES: tuple[tuple[int, Moments | None, bool], ...] = (
-    (6, alike, False), (8, alike, False),
+    (6, alike, False), (4, alike, False),
     (12, around, False), (10, edge, False), (10, edge, True), (14, corner, False),
     (32, around, False), (32, edge, False), (32, edge, True),
     (60, around, False), (60, edge, False), (60, edge, True), *3 * ((60, None, False),),
@@ -68,7 +68,7 @@ TRIES: tuple[tuple[int, Moments | None, bool], ...] = (
 MORE, FEW = 32, 300  # more than MORE neighbours are tried only if at most FEW asperities remain
 ALONE = 6  # neighbours of an asperity outside the contact that are tried, each alone
 NEAR = 9  # where (7) proves (6) far away, (6) is computed for NEAR times as many as have weights
-NEAR_ALIKE = 5  # the same number for equal weights
+NEAR_ALIKE = 24  # the number of asperities for which (6) is computed if the weights are equal
 SEARCHES = 15  # systems solved for weights; each leaves out earlier neighbours of negative weight
 SAMPLE = 300  # the linear program considers about twice as many asperities
 TURN = 0.4  # angle from the two lines of a corner to a line perpendicular to the dipole
@@ -107,7 +107,7 @@ def swept_rates(influence: Influence, c: Array, rates: Array, spare: Array) -> A
                 else:
                     make = partial(swept.weights, moments, by_near)
                     weights = _in_parts(make, (near.shape[1] + 5) ** 2, which, near)
-                checked = (NEAR_ALIKE if moments is alike else NEAR) * near.shape[1]
+                checked = NEAR_ALIKE if moments is alike else NEAR * near.shape[1]
                 found = swept.rates(which, near, weights, least[which], checked)
                 rates[which], failed[some] = found
             todo = ~(rates[left] > least[left])
