@@ -315,8 +315,9 @@ class _Swept:
         with np.errstate(divide="ignore", invalid="ignore"):
             rest = total(apart**4 / np.maximum(r[:, None] - apart, 0.0))
             s = -(weights * d**2).sum(axis=1) * (first.conj() / size) ** 2
-            across = s.real * (1.0 - 2.0 * (m / size / r) ** 2) - np.abs(s.imag)
-        edge = (s.real >= 0) & (size * r >= 1.5 * s.real)
+            beyond = m / size / r
+            across = s.real * (1.0 - 2.0 * beyond**2) - 2.0 * np.abs(s.imag) * beyond
+        edge = (s.real >= 0) & (size * r >= 1.5 * np.abs(s))
         both = np.maximum(-m, np.where(ahead >= 0, ahead, -np.inf)) - 3 / 4 * total(d**2)
         both = np.where(edge, np.fmax(both, 3 / 4 * across - m), both)
         kappa = square / 4 + both - (third + rest) / r
