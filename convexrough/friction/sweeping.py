@@ -67,7 +67,7 @@ TRIES: tuple[tuple[int, Moments | None, bool], ...] = (
 
 MORE, FEW = 32, 300  # more than MORE neighbours are tried only if at most FEW asperities remain
 ALONE = 6  # neighbours of an asperity outside the contact that are tried, each alone
-NEAR = 9  # where (7) proves (6) far away, (6) is computed for NEAR times as many as have weights
+NEAR = 7  # where (7) proves (6) far away, (6) is computed for NEAR times as many as have weights
 NEAR_ALIKE = 24  # the number of asperities for which (6) is computed if the weights are equal
 SEARCHES = 15  # systems solved for weights; each leaves out earlier neighbours of negative weight
 SAMPLE = 300  # the linear program considers about twice as many asperities
