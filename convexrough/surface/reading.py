@@ -172,7 +172,7 @@ def _unfilled(heights: Array, fill: bool) -> tuple[Array, NDArray[np.bool_] | No
         return heights, None
     named = [f"{each:g}" for each in np.unique(heights[empty])]
     row, column = np.argwhere(empty)[0] + 1
-    found = f"{holes:,} holes ({', '.join(named)}) in {heights.size:,} pixels"
+    found = f"{holes:,} hole{'s' * (holes > 1)} ({', '.join(named)}) in {heights.size:,} pixels"
     found += f", the first in row {row}, column {column}"
     heights = np.where(marks, np.nan, heights)
     if holes == heights.size:

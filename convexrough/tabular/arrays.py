@@ -144,7 +144,7 @@ def _of_one_shape(path: Path, arrays: dict[str, NDArray[Any]], known: Sequence[s
     shapes = {name: each.shape for name, each in arrays.items() if name.lower() in known}
     if wide and (len(shapes) == 1 or {*shapes.values()} != {wide[0]}):
         found = ", ".join(f"{name} of {' x '.join(map(str, it))}" for name, it in shapes.items())
-        expected = "vectors, or x, y and values of one shape"
+        expected = "vectors, or matrices x, y (as of meshgrid) and values of one shape"
         expected += ": vectors x, y do not show what the rows are" * (len({*wide[0]}) == 1)
         raise FileError(f"{path}: found {found} numbers, expected {expected}")
     return {name: each.ravel().tolist() for name, each in arrays.items()

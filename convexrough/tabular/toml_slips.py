@@ -23,6 +23,7 @@ _SLIPS = {
         "{number}", rf"=\s*(?P<number>{_NUMBER})\s*(?![exEX]\W*\d)[^\W\d_][^\s#=]*"),
     "digits on both sides of the point": (
         "{number}", r"=\s*(?P<number>[+-]?(?:\d+\.|\.\d+)(?:[eE][+-]?\d+)?)"),
+    "text with a backslash in single quotes": ("'{text}'", r'=\s*"(?P<text>[^"\']*\\[^"\']*)"'),
     "lower case": ("{word}", r"=\s*(?P<word>(?i:[+-]?inf|true|false))"),
     "text in straight quotes, or a number": (
         '"{text}"',

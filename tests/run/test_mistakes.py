@@ -158,6 +158,7 @@ def test_all_mistakes_are_told_at_once(tmp_path: Path) -> None:
         ("pattern = hexagonal", 'pattern = "hexagonal"', "straight quotes"),
         ("pattern = “hexagonal”", 'pattern = "hexagonal"', "straight quotes"),
         ("spacing = Inf", "spacing = inf", "lower case"),
+        (r'path = "C:\Users\a.csv"', r"path = 'C:\Users\a.csv'", "single quotes"),
         ("path = my summits.csv", 'path = "my summits.csv"', "straight quotes"),
     ],
 )
