@@ -158,10 +158,7 @@ def test_arrays_of_two_dimensions(tmp_path: Path) -> None:
         assert (read(tmp_path, axes | {"pressure": matrix}, "a.npz").values == found).all()
     lone, square, nodes = {"load": pressure}, pressure[:13], np.ones((28, 3))
     for made, said in (
-        (
-            lone,
-            "load of 28 x 13 numbers, expected vectors, or matrices x, y (as of meshgrid) and values of one shape",
-        ),
+        (lone, r"load of 28 x 13 numbers, expected vectors, or matrices x, y \(as of meshgrid\)"),
         (axes | {"y": y[:13, 0], "pressure": square}, "shape: vectors x, y do not show what the r"),
         (axes | {"x": y[:, 0], "pressure": nodes}, "pressure of 28 x 3 numbers, expected vectors"),
     ):
