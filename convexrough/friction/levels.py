@@ -171,7 +171,7 @@ def is_gross(displacement: float, farthest: Ball) -> bool:
     Raises InputError for larger X.
     """
     if not displacement <= (most := float(farthest.value)) * (1 + 1e-14):
-        found = f"{displacement!r}: gross sliding"
+        found = f"{float(displacement)!r}: gross sliding"
         expected = f"at most X = {most!r}, at which gross sliding starts"
         raise InputError("displacement", found=found, expected=expected)
     left = (farthest - Ball.exact(displacement)).value

@@ -15,6 +15,7 @@ from convexrough.arrays import Array, Indices
 from convexrough.errors import FileError, InputError
 from convexrough.surface.surface import checked_pixel
 from convexrough.tabular.arrays import named_arrays
+from convexrough.tabular.units import bare, one_unit, unit
 
 #: Names of arrays of an .npz or .mat file: of the heights; of the pixel and the units; and parts of
 #: names of other arrays that probably change the meaning of the heights, which are errors.
@@ -61,7 +62,11 @@ def arrays_map(path: Path) -> HeightGrid:
         expected += "marks holes"
         raise InputError("arrays", found=", ".join(others), expected=expected)
     size = checked_pixel(np.squeeze(named["pixel"])) if "pixel" in named else None
-    unit, height_unit = (str(named.get(name, "")) for name in STATED[1:])
+    said, height_unit = (str(named.get(name, "")) for name in STATED[1:])
+    if upwards := one_unit("height_unit", height_unit, unit(chosen)):
+        height_unit = upwards.name
+    texts = [(name, values) for name, values in rest.items() if values.dtype.kind in "US"]
+    comments = tuple(f"{name}: {each}" for name, values in texts for each in values.ravel())
     heights = np.squeeze(_numbers(named[chosen]))
     axes = [np.atleast_1d(np.squeeze(_numbers(named[name]))) for name in "xy" if name in named]
     if len(axes) == 1:
@@ -73,13 +78,13 @@ def arrays_map(path: Path) -> HeightGrid:
         heights, steps = on_grid(heights, *axes)
         size = size or steps
         refuse_other(size, steps, ROUNDED, "the steps of x and y")
-    return HeightGrid(heights, size, unit, height_unit)
+    return HeightGrid(heights, size, said, height_unit, comments)
 
 
 def _chosen(found: dict[str, NDArray[Any]]) -> str:
     """The name of the array of heights."""
     maps = [name for name in found if found[name].ndim == 2 and name.lower() not in ("x", "y")]
-    likely = [name for name in found if name.lower() in HEIGHTS] or maps
+    likely = [name for name in found if bare(name).lower() in HEIGHTS] or maps
     likely = ["heights"] if "heights" in likely else likely
     if len(likely) != 1:
         names = ", ".join(likely or found) or "none"

@@ -122,7 +122,9 @@ def read_table(
     short = len(others) == 1 == len(missing) and len(others[0]) < 40
     other = others[0] if short else "NAME" if source.header else "NUMBER"
     pixels = instead and {"x", "y"} <= places.keys()
-    advice = ": rename one" if source.header else ": add a first row with names"
+    arrays = path.suffix.lower() in ARRAYS
+    naming = "save vectors with these names" if arrays else "add a first row with names"
+    advice = ": rename one" if source.header else f": {naming}"
     advice = "" if how.scalable else advice
     mistakes += [
         f"columns: found {source.named()}, expected a column {each!r}"

@@ -74,6 +74,10 @@ LONGEST_NAME = 400
 _WITH_UNIT = re.compile(
     r"(?P<name>.*?)(?:\s*[\[(](?P<unit>[^\])]*)[\])]|\s+/\s*(?P<per>\S+)|/(?P<tight>\S+))"
 )
+_LOOSE = re.compile(r"(.*?[^\W_])(?:[\s_]+in[\s_]+|[\s_.]+)([^\s_./]{2,})")
+
+#: Units that after a name and a space, a point or "_" are not read as units.
+AMBIGUOUS = ("in", "bar", "pm")
 
 
 def in_text(text: str) -> list[str]:
@@ -109,13 +113,16 @@ def bare(name: str) -> str:
 
 
 def unit(name: str) -> str:
-    """The unit in the name of a column, in brackets or after a slash; "" if there is none."""
+    """The unit in the name of a column, as in "x [µm]", "x / m" or "x_mm"; "" if there is none."""
     return _apart(name)[1]
 
 
 def _apart(name: str) -> tuple[str, str]:
     found = _WITH_UNIT.fullmatch(name) if len(name) <= LONGEST_NAME else None
     if not found or (found["tight"] and not parsed(found["tight"])):  # as for p/p0
+        loose = _LOOSE.fullmatch(name) if len(name) <= LONGEST_NAME else None
+        if loose and loose[2] not in AMBIGUOUS and parsed(loose[2]):
+            return loose[1], loose[2]
         return name, ""
     return found["name"], (found["unit"] or found["per"] or found["tight"] or "").strip()
 

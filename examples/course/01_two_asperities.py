@@ -172,8 +172,9 @@ assert np.allclose(found.x, answer, atol=1e-6)
 # *Answer.* There are three: either asperity alone touches (the other has a gap of 0.5), or both
 # touch with :math:`P_1 = P_2 = 1 / (1 + A) = 0.4`. The energy is a saddle: along
 # :math:`P_1 + P_2 = \text{const}` it is highest in the middle, so the state in which both touch is
-# not even a local minimum. Beyond :math:`A = 1` the energy is not convex and the solution is not
-# unique. The shell lemma of lesson 3 shows how large contact radii may be for given distances.
+# not even a local minimum. Beyond :math:`A = 1` the energy is not convex, and several solutions
+# exist if :math:`D_1` and :math:`D_2` are nearly equal. The shell lemma of lesson 3 shows how large
+# contact radii may be for given distances.
 
 closer = np.array([[1.0, 1.5], [1.5, 1.0]])
 crowded = [case for case in CASES if allowed(*solve_case(case, np.ones(2), closer))]

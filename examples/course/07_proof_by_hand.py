@@ -53,7 +53,7 @@ print("pairs that solve the first equation in float64 arithmetic:", len(solved))
 assert len(solved) > 1
 
 # %%
-# In float64 many neighbouring numbers solve the equations exactly. In exact arithmetic:
+# In float64 several neighbouring pairs solve the first equation exactly. In exact arithmetic:
 
 for x, y in solved[:3]:
     off = residuals((Fraction(float(x)), Fraction(float(y))))

@@ -68,6 +68,15 @@ def test_arrays(tmp_path: Path) -> None:
         raw(several, sides | {"x": X[0], "y": [0.0]})
     with pytest.raises(cr.InputError, match='found height, z, expected one called "heights"'):
         raw(several, {"height": HEIGHTS, "z": 2 * HEIGHTS})
+    sides = {"pixel": 1.0, "unit": "µm"}
+    for name in ("height_nm", "Z_nm", "topography in nm"):
+        found = raw(several, sides | {name: 1e3 * HEIGHTS, "by": "Anna"})
+        assert_allclose(found.heights, HEIGHTS, rtol=1e-14)
+        assert found.comments == ("by: Anna",)
+    with pytest.raises(cr.InputError, match="height_unit: found µm, expected nm, as the file says"):
+        raw(several, sides | {"height_nm": HEIGHTS, "height_unit": "µm"})
+    with pytest.raises(cr.InputError, match="comments: found note: heights in nm, expected"):
+        raw(several, sides | {"heights": HEIGHTS, "note": "heights in nm"})
 
 
 def test_what_gwyddion_writes(tmp_path: Path) -> None:

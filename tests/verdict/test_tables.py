@@ -233,7 +233,7 @@ def test_loads_at_a_slightly_different_place(tmp_path: Path, offset: float, fine
         ("1,2,3\n4,5,6\n7,8,9\n", "columns 1, 2: found 0 positions of asperities in 3 rows"),
         ("0,0,3\n1,0,6\n7,8,9\n", "row 3: found position [7.0, 8.0], "),
         ("node,load\n103,1\n101,1\n102,1\n", "column node: found 103, expected at most 3, the"),
-        ("x_mm,y_mm,load\n0,0,1\n1,0,1\n2,0,1\n", "expected --column x=x_mm --column y=y_mm"),
+        ("x_pos,y_pos,load\n0,0,1\n1,0,1\n2,0,1\n", "expected --column x=x_pos --column y=y_pos"),
         (b"PK\x03\x04...", "not text: an archive or an Excel workbook; name it .xlsx"),
         (b"MATLAB 5.0 MAT-file", "not text: a MAT-file; name it .mat"),
         (b"load\n1\x00\n", "row 2: not text"),
@@ -304,6 +304,10 @@ def test_summits_without_a_header(tmp_path: Path) -> None:
         ("x,y,depth\n0,0,1\n", "sphere: write depths as negative heights"),
         ("x,y\n0,0\n", "tip radii: found neither"),
         ("x,y\n0,0\n0,0\n", "asperities 0 and 1"),
+        *(
+            (f"x,y,{each}\n0,0,1\n", "column height: found mm, and a scene without units, expected")
+            for each in ("height_mm", "Height mm", "z in mm", "HEIGHT.mm", "height_in_mm")
+        ),
         ("# heights x 1000\nx,y,z\n0,0,1\n", "found '# heights x 1000', expected no factor of the"),
         ("# units: micrometres\nx,y,z\n0,0,1\n", "found '# units: micrometres', expected units in"),
     ],
