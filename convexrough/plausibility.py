@@ -183,10 +183,11 @@ def axis_outside(scene: Scene) -> bool:
 
 def rim_touching(scene: Scene, touching: NDArray[np.bool_], approach: float) -> float:
     """Fraction that touches of the rim (the farthest in each of 16 sectors); 0 without an array, or
-    if no asperity of the same pattern beyond the rim could touch.
+    if asperities are equal and none of the same pattern beyond the rim could touch.
     """
-    layout = scene.asperities.layout
-    if not is_array(scene) or scene.reach(approach) <= layout.filled * (1 + 1e-9):
+    layout, tips = scene.asperities.layout, scene.asperities
+    equal = np.ptp(tips.heights) == 0 == np.ptp(tips.tip_radii)
+    if not is_array(scene) or (equal and scene.reach(approach) <= layout.filled * (1 + 1e-9)):
         return 0.0
     return float(touching[layout.rim].mean())
 

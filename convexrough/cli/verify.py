@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -62,9 +62,11 @@ class _Reporting(click.Command):
     """A command that removes an earlier --junit FILE also if its other arguments are wrong."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        words = "\n".join(args).replace("--junit=", "--junit\n").split("\n")
+        parts = (each.split("=", 1) if each.startswith("--junit=") else [each] for each in args)
+        words = [*chain(*parts)]
         earlier = Path(dict(pairwise(words)).get("--junit", ""))
-        if "--force" in words and earlier.suffix.lower() == ".xml" and not ctx.resilient_parsing:
+        runs = "--force" in words and not {"--help", "-h"} & {*words} and not ctx.resilient_parsing
+        if runs and earlier.suffix.lower() == ".xml":
             with suppress(OSError):  # `verify` reports it
                 earlier.unlink(missing_ok=True)
         return super().parse_args(ctx, args)
@@ -194,8 +196,8 @@ def verify(
     for hint in (hint for claim in claims for hint in claim.hints()):
         common.say_aside("hint", hint)
     found = of_loads.solution
-    pressed = claimed if found is None else found.loads
-    for caution in cautions_about(file.scene, pressed, of_loads.certificate.approach):
+    pressed = (claimed, of_loads.certificate) if found is None else (found.loads, found)
+    for caution in cautions_about(file.scene, pressed[0], pressed[1].approach):
         common.say_aside("warning", caution)
     status = common.DONE
     if not all(claim.holds for claim in claims):

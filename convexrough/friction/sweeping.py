@@ -33,11 +33,6 @@ T = TypeVar("T")
 Moments = Callable[[NDArray[np.complex128]], list[Array]]
 
 
-def alike(d: NDArray[np.complex128]) -> list[Array]:
-    """No moments: the weights are equal where those of `around` are then 0, as on lattices."""
-    return []
-
-
 def around(d: NDArray[np.complex128]) -> list[Array]:
     """The moments that are 0 where neighbours lie all around; (7) then proves (6) for far ones."""
     return [d.real, d.imag, (d * d).real, (d * d).imag]
@@ -55,20 +50,24 @@ def corner(d: NDArray[np.complex128]) -> list[Array]:
 
 # All numbers here are heuristics.
 
-#: Numbers of neighbours, moments of the weights (None for the linear program), and whether the mean
-#: of the neighbours decides what is outward. They are tried until the bound 1 - q_i suffices. A try
-#: also uses the asperities that determined q_i in earlier tries.
-TRIES: tuple[tuple[int, Moments | None, bool], ...] = (
-    (6, alike, False), (4, alike, False),
+#: Equal weights, where the moments of `around` are then 0, as on hexagonal and square lattices; and
+#: weights by the linear program.
+EQUAL, LIGHTEST = "equal", "lightest"
+
+#: Numbers of neighbours, moments of the weights or one of these words, and whether the mean of the
+#: neighbours decides what is outward. They are tried until the bound 1 - q_i suffices. A try also
+#: uses the asperities that determined q_i in earlier tries.
+TRIES: tuple[tuple[int, Moments | str, bool], ...] = (
+    (6, EQUAL, False), (4, EQUAL, False),
     (12, around, False), (10, edge, False), (10, edge, True), (14, corner, False),
     (32, around, False), (32, edge, False), (32, edge, True),
-    (60, around, False), (60, edge, False), (60, edge, True), *3 * ((60, None, False),),
+    (60, around, False), (60, edge, False), (60, edge, True), *3 * ((60, LIGHTEST, False),),
 )  # fmt: skip
 
 MORE, FEW = 32, 300  # more than MORE neighbours are tried only if at most FEW asperities remain
 ALONE = 6  # neighbours of an asperity outside the contact that are tried, each alone
 NEAR = 7  # where (7) proves (6) far away, (6) is computed for NEAR times as many as have weights
-NEAR_ALIKE = 24  # the number of asperities for which (6) is computed if the weights are equal
+NEAR_EQUAL = 24  # the number of asperities for which (6) is computed if the weights are equal
 SEARCHES = 15  # systems solved for weights; each leaves out earlier neighbours of negative weight
 SAMPLE = 300  # the linear program considers about twice as many asperities
 TURN = 0.4  # angle from the two lines of a corner to a line perpendicular to the dipole
@@ -100,14 +99,14 @@ def swept_rates(influence: Influence, c: Array, rates: Array, spare: Array) -> A
             for some in threads.chunks(len(left), ROWS):
                 which = left[some]
                 near = np.column_stack((swept.neighbours(which, count), worst[some]))
-                if moments is alike:
+                if moments == EQUAL:
                     weights = swept.equal(which, near, count)
-                elif moments is None:
-                    weights = swept.lightest(which, near)
-                else:
+                elif callable(moments):
                     make = partial(swept.weights, moments, by_near)
                     weights = _in_parts(make, (near.shape[1] + 5) ** 2, which, near)
-                checked = NEAR_ALIKE if moments is alike else NEAR * near.shape[1]
+                else:
+                    weights = swept.lightest(which, near)
+                checked = NEAR_EQUAL if moments == EQUAL else NEAR * near.shape[1]
                 found = swept.rates(which, near, weights, least[which], checked)
                 rates[which], failed[some] = found
             todo = ~(rates[left] > least[left])
@@ -319,7 +318,7 @@ class _Swept:
             across = s.real * (1.0 - 2.0 * beyond**2) - 2.0 * np.abs(s.imag) * beyond
         edge = (s.real >= 0) & (size * r >= 1.5 * np.abs(s))
         both = np.maximum(-m, np.where(ahead >= 0, ahead, -np.inf)) - 3 / 4 * total(d**2)
-        both = np.where(edge, np.fmax(both, 3 / 4 * across - m), both)
+        both = np.where(edge, np.maximum(both, 3 / 4 * across - m), both)
         kappa = square / 4 + both - (third + rest) / r
         # Where kappa > square / 64, kappa / 2 is far larger than its rounding error.
         return np.asarray(np.where(kappa > square / 64, kappa / 2 / self.extent**2, 0.0))

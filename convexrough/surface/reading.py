@@ -54,7 +54,9 @@ SAME = 1e-6
 _SAID = re.compile(r"[#%;\s]*(width|height|value units?)\s*[:=]\s*(.*?)\s*", re.I)
 #: A line of the header of an ESRI grid, such as "cellsize 0.5".
 _ESRI = re.compile(
-    r"(ncols|nrows|[xy]llc\w+|cellsize|d[xy]|nodata_value)\s+(-?\d+[.,]?\d*(?:e[+-]?\d+)?)$", re.I
+    r"(ncols|nrows|[xy]llc\w+|cellsize|d[xy]|nodata_value)[\s:=]+"
+    r"(nan|-?(?:\d+\.?\d*|\.\d+|\d+,(?!\d{3}$)\d*)(?:e[+-]?\d+)?)$",
+    re.I,
 )
 _COMMENT = re.compile(f"{COMMENT.pattern}|{_SAID.pattern}|{_ESRI.pattern}", re.I)
 _LENGTH = re.compile(r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(.*)")

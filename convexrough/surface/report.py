@@ -264,10 +264,8 @@ def _describe_curve(curve: Provability, unit: str, force: str) -> list[str]:
     lightest, heaviest = (each.reduce(curve.loads) for each in (np.fmin, np.fmax))
     load = f"load {heaviest:.6g} {force}".rstrip() + ", "
     span = f"{least:.6g}" + (f" to {most:.6g}" if most > least else "")
-    at = (
-        load if 0 < heaviest <= lightest * (1 + 1e-9) else ""
-    ) + "approach of the pressing body from height 0: "
-    at += f"{span} {unit}".rstrip()
+    at = load if 0 < heaviest <= lightest * (1 + 1e-9) else ""
+    at += f"approach of the pressing body from height 0: {span} {unit}".rstrip()
     return [*labelled([("pressed at", at)]), *aligned(table), "", *labelled(said)]
 
 

@@ -19,8 +19,10 @@ from convexrough.errors import ConvexroughError, FileError
 Columns = dict[str, list[Any]]
 
 #: Names of arrays, and words of comments, for factors or offsets; the end of "heights x 1000".
-FACTORS = re.compile(r"(?<![a-z])(scale[ds]?|fa[ck]tors?|multipl\w+|gain|offsets?)(?![a-z])", re.I)
-TIMES = re.compile(r"[^\d\s](\s*[*×]|\s+x)\s*\d\S*\s*$")
+FACTORS = re.compile(
+    r"(?<![a-z])(scale[ds]?|fa[ck]tors?|multipl[iy]\w*|times|divided|gain|offsets?)(?![a-z])", re.I
+)
+TIMES = re.compile(r"[^\d\s](\s*[*×÷]|\s+[x/])\s*[+-]?[.,]?\d\S*\s*$")
 
 #: Extensions of files of arrays.
 ARRAYS = (".npy", ".npz", ".mat", ".parquet")
@@ -135,14 +137,15 @@ def _is_table(name: str, values: Any, known: Sequence[str]) -> bool:
 
 def _of_one_shape(path: Path, arrays: dict[str, NDArray[Any]], known: Sequence[str]) -> Columns:
     """All vectors; or all arrays of one two-dimensional shape, if all `known` arrays have it."""
+    shapes = {name: each.shape for name, each in arrays.items() if name.lower() in known}
     axes = {each.size: name for name, each in arrays.items() if name.lower() in ("x", "y")}
     wide = [each.shape for name, each in arrays.items() if name.lower() in known and each.ndim > 1]
     if wide and len(axes) == 2 == len(wide[0]) and axes.keys() == {*wide[0]}:  # lengths show order
         names = [axes[size] for size in wide[0]]
         mesh = np.meshgrid(*(arrays[name] for name in names), indexing="ij")
         arrays = arrays | dict(zip(names, mesh, strict=True))
-    shapes = {name: each.shape for name, each in arrays.items() if name.lower() in known}
-    if wide and (len(shapes) == 1 or {*shapes.values()} != {wide[0]}):
+    meshed = {name: each.shape for name, each in arrays.items() if name.lower() in known}
+    if wide and (len(meshed) == 1 or {*meshed.values()} != {wide[0]}):
         found = ", ".join(f"{name} of {' x '.join(map(str, it))}" for name, it in shapes.items())
         expected = "vectors, or matrices x, y (as of meshgrid) and values of one shape"
         expected += ": vectors x, y do not show what the rows are" * (len({*wide[0]}) == 1)

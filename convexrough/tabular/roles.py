@@ -172,9 +172,10 @@ def units_in(said: Iterable[tuple[str, str]], names: Sequence[str], how: Reading
     unit than the scene's for one of the columns `names`, whose headers state none."""
     kinds = {COLUMNS[name].kind for name in names}
     for place, text in said:
-        numbers = {*map(float, re.findall(r"\d+(?:\.\d+)?(?:e[+-]?\d+)?", text, re.I))} - {0.0, 1.0}
+        numbers = re.findall(r"[+-]?[.,]?\d[\d.,]*(?:e[+-]?\d+)?", text, re.I)
+        changes = not all(re.fullmatch(r"\+?(1(\.0*)?|0)", number) for number in numbers)
         factor = FACTORS.search(text) or TIMES.search(text)
-        if numbers and factor and not how.scales:
+        if changes and factor and not how.scales:
             way = ", or --scale" * how.scalable
             yield f"{place}: found {shortened(text)!r}, expected no factor of the numbers{way}"
         for name in in_text(text):

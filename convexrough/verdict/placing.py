@@ -165,7 +165,8 @@ class Placing:
         points = own if self.points is None else self.points
         ways = (("x >=", (1, 0)), ("x <=", (-1, 0)), ("y >=", (0, 1)), ("y <=", (0, -1)))
         sides = [f"{side} 0" for side, along in ways
-                 if (points @ along).min() >= -near > (own @ along).min()]  # fmt: skip
+                 if (points @ along).min() >= -near > (own @ along).min()
+                 and (points @ along).max() > near]  # fmt: skip
         return f"; rows only at {', '.join(sides)}: part of a symmetric array?" if sides else ""
 
     # By an index, or in order

@@ -153,6 +153,21 @@ def test_slopes(kind: str, layout: str, seed: int) -> None:
         assert errors.max() <= limit * top or layout == "coincident"
 
 
+@pytest.mark.parametrize("family", ["hexagonal", "square"])
+def test_slopes_on_lattices_that_are_made(family: str) -> None:
+    """Points are on their sites up to rounding, so that transforms cause most of the bound."""
+    rng = np.random.default_rng(0)
+    array = getattr(cr.Asperities, family)(spacing=1.0, tip_radius=1.0, within=20.0)
+    scene = cr.Scene(1e3, array, cr.Material(1.0, 0.3), geometry="summit")
+    A = NormalProblem.assemble(scene, approach=1.0, influence="lattice").influence
+    for load in loadings(len(A), rng):
+        found, error = A.slopes(load), A.slope_errors(load)
+        for i in rng.integers(0, len(A), 3):
+            true = pulled(A.points, load, i, A.scale)
+            off = [abs(float(arb(x) - y)) for x, y in zip(found[i], true, strict=True)]
+            assert max(off) <= error
+
+
 @pytest.mark.parametrize("name", BASES)
 def test_what_is_nearly_a_lattice_is_none(name: str) -> None:
     points = lattice_patch(np.array(BASES[name]), 500)

@@ -123,6 +123,13 @@ def test_an_array_for_the_largest_load_of_a_path(tmp_path: Path) -> None:
         assert any(each.startswith("under the loads of [path]") for each in said) == ended
 
 
+def test_a_path_that_starts_and_ends_at_the_load_0(run: Any) -> None:
+    """There the highest asperity just touches: its status is undecided, and nothing is doubted."""
+    table = "[path]\nloads = [0.0, 3e-7, 0.0]\nforces = [0.0, 0.0, 0.0]\n"
+    outcome = run(scene_text(WITHIN, more=FRICTION + table))
+    assert (outcome.status, outcome.err) == (0, "")
+
+
 STEADY = FRICTION + "[steady]\nreference = 1e60\n"
 STEADY += "ellipse = {load = 1.0, force_amplitude = 0.1, chords = 6}\n"
 

@@ -73,7 +73,7 @@ MISTAKES = [
     (stage("[cycle]\nmaximum_fraction = 0.1\ndisplacement = 1e-6"),
      "[cycle] maximum_fraction, displacement: found both, expected exactly one of the two"),
     (stage("[cycle]\ndisplacement = 1e-6\nminimum_fraction = 0.1"),
-     "[cycle] maximum_fraction: missing, needed with minimum_fraction"),
+     "[cycle] minimum_fraction: not used with displacement"),
     (stage("[cycle]\ndisplacement = []"),
      "[cycle] displacement: found [], expected a positive number, or a list of these"),
     (stage("[cycle]\ndisplacement = 1.0"),

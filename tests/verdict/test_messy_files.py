@@ -289,7 +289,9 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     **{f"a factor in a comment, {said!r}": (
         lambda case, said=said: f"# {said}\n" + lines(case.table()), "",
         f"comments: found '# {said}', expected no factor of the numbers, or --scale\n")
-       for said in ("loads x 1000", "loads * 1e3", "scale factor: 1e-3", "multiplied by 9")},
+       for said in ("loads x 1000", "loads * 1e3", "scale factor: 1e-3", "multiplied by 9",
+                    "loads x 1,000", "scale: .001", "factor 1 000", "multiplied by -1",
+                    "load / 1000", "divided by 100")},
     "places under other names": (lambda case: case.table("COORD1 COORD2 load"), "",
                                  "COORD1, COORD2: found positions in another order than the sc",
                                  "expected --column x=COORD1 --column y=COORD2"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -90,7 +90,6 @@ class CycleStage(Stage):
                "undecided")  # fmt: skip
 
     alternatives = ("maximum_fraction", "displacement")
-    needs: ClassVar[Mapping[str, str]] = {"minimum_fraction": "maximum_fraction"}
 
     maximum_fraction: Fractions = Field(default=[])
     minimum_fraction: Fractions | None = None
@@ -113,6 +112,10 @@ class CycleStage(Stage):
         return {"maximum_fraction": self.maximum_fraction, "minimum_fraction": self.lowest}
 
     def mistakes_within(self) -> Iterator[Mistake]:
+        if self.displacement:
+            if self.minimum_fraction is not None:
+                yield "minimum_fraction", "not used with displacement"
+            return
         if (n := len(self.lowest)) != len(self.maximum_fraction):
             expected = f"expected {len(self.maximum_fraction)}, as in maximum_fraction"
             yield "minimum_fraction", f"found {n} values, {expected}"
