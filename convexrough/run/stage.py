@@ -7,6 +7,7 @@ result.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -188,7 +189,7 @@ class Result(Record):
         if unsure := sum(row.get("undecided", 0) for row in loaded):
             many = "status" if unsure == 1 else "statuses"
             yield f"not certified: {unsure} {many} in {self.name} undecided"
-        if not self.orders <= {"proved", "proved for one step"}:
+        if not {*self.orders} <= {"proved", "proved for one step"}:
             needs = f"which the proof of [{self.name}] needs"
             yield f"not proved: that indentations increase with the load, {needs}"
         elif "proved for one step" in self.orders and "loss" in self.stage.numbers:
@@ -204,9 +205,9 @@ class Result(Record):
         yield from ()
 
     @property
-    def orders(self) -> set[str]:
-        """The set of the attributes `order` (docs/theory/states.md) of the objects in `found`."""
-        return {each.order for each in self.found if getattr(each, "order", None)}
+    def orders(self) -> Counter[str]:
+        """The numbers of objects in `found` with each `order` (docs/theory/states.md)."""
+        return Counter(each.order for each in self.found if getattr(each, "order", None))
 
     @property
     def certified(self) -> bool:
@@ -236,7 +237,9 @@ class Result(Record):
     def lines(self) -> list[str]:
         """The printed lines: a table and, where it matters, what is proved about order."""
         said = self.printed_table(self.name, self.known, self.headings(), self.title)
-        proved = ", ".join(sorted(self.orders))
+        proved = "".join(self.orders)
+        if len(self.orders) > 1:
+            proved = ", ".join(f"{each} (rows: {n})" for each, n in sorted(self.orders.items()))
         return [*said, *([f"indentations increase with the load: {proved}"] if proved else [])]
 
     def printed_table(

@@ -153,7 +153,7 @@ class CycleResult(Result):
     printed = heads(
         "maximum_fraction: max/(fP), minimum_fraction: min/(fP), force_amplitude: Qa, "
         "displacement_amplitude: Xa, secant_stiffness: Qa/Xa, loss: W, loss_factor: W/(pi Qa Xa), "
-        "loss_normalised: W/W0, smooth_normalised: smooth W/W0, sliding"
+        "loss_normalised: W/W0, smooth_normalised: smooth W/W0, sliding, undecided"
     )
 
     def rows(self) -> list[Summary]:
@@ -203,10 +203,15 @@ class CycleResult(Result):
         return {**super().tables(), "loop": curves, "fretting": worn}
 
     def headings(self) -> Mapping[str, str]:
-        """The headings of columns in the rows, without W/W0 if there is no smooth reference."""
-        row, printed = self.known[0], self.printed.items()
-        known = not math.isnan(row["smooth_normalised"])
-        return {it: head for it, head in printed if it in row and (known or "_norm" not in it)}
+        """The headings of columns in the rows, without W/W0 if there is no smooth reference, and
+        without numbers of undecided asperities if all are 0.
+        """
+        row, left_out = self.known[0], set[str]()
+        if math.isnan(row["smooth_normalised"]):
+            left_out |= {"loss_normalised", "smooth_normalised"}
+        if not any(each["undecided"] for each in self.known):
+            left_out.add("undecided")
+        return {it: head for it, head in self.printed.items() if it in row and it not in left_out}
 
     def lines(self) -> list[str]:
         if "loss_normalised" in self.headings():
