@@ -12,6 +12,7 @@ from convexrough.errors import ConvexroughError
 from convexrough.gallery.cases import HardCase, case, stored
 from convexrough.normal.certificate import certify
 from convexrough.normal.problem import NormalProblem
+from convexrough.programs.formats import sizes
 from convexrough.programs.program import WRITERS, Form, scaled_eigenvalues, stated
 from convexrough.progress import LOGGER
 from convexrough.tabular.columns import markdown
@@ -106,8 +107,8 @@ def _packed(case: HardCase) -> tuple[About, dict[str, bytes]]:
             endings.append("cbf")
         for ending in endings:
             name = f"{case.name}.{ending if ending == 'cbf' else f'{form}.{ending}'}"
-            about["programs"][name] = program.about()
             files[name] = WRITERS[form][ending](program.data)
+            about["programs"][name] = program.about() | sizes(ending, files[name])
     return about, files
 
 

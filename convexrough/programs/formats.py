@@ -149,6 +149,14 @@ def cbf(program: ConeProgram) -> bytes:
     return "\n\n".join("\n".join(block) for block in blocks).encode() + b"\n"
 
 
+def sizes(ending: str, content: bytes) -> dict[str, int]:
+    """The sizes that a file in CBF states; {} for formats with the sizes of the program."""
+    if ending != "cbf":
+        return {}
+    words, marks = content.split(), {"variables": "VAR", "constraints": "CON", "nonzeros": "ACOORD"}
+    return {name: int(words[words.index(mark.encode()) + 1]) for name, mark in marks.items()}
+
+
 def _entries(matrix: Any) -> Iterator[tuple[int, int, float]]:
     yield from zip(matrix.row.tolist(), matrix.col.tolist(), matrix.data.tolist(), strict=True)
 

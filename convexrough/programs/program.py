@@ -20,7 +20,7 @@ from convexrough.arrays import Array, Indices, frozen
 from convexrough.atomic import replacing
 from convexrough.errors import ConvexroughError, InputError, SolverError
 from convexrough.normal.problem import NormalProblem
-from convexrough.programs.formats import cbf, clarabel_json, cone_npz, mps, qpsolvers_npz
+from convexrough.programs.formats import cbf, clarabel_json, cone_npz, mps, qpsolvers_npz, sizes
 from convexrough.record import Record
 from convexrough.scene.scene import Scene
 from convexrough.solvers import Newton
@@ -280,7 +280,7 @@ def write_programs(
                 left_out[path.name], last = str(error), error
                 continue
             written.append(path)
-            about[path.name] = program.about()
+            about[path.name] = program.about() | sizes(ending, path.read_bytes())
     if not written:
         raise last
     index = {

@@ -57,8 +57,8 @@ def describe_comparison(summary: Summary, units: UnitNames) -> list[str]:
     lines += [
         f"disagreement       largest difference from the loads of {reference} / largest load",
         "load error         largest bound on the error of a load / largest load of the solver",
-        f"duality gap        {f'in {work}, ' if work else ''}bound on the energy of the loads minus"
-        " that of the solution",
+        f"duality gap        {f'in {work}, ' if work else ''}bound on the energy of the loads,"
+        " scaled to a prescribed total, minus that of the solution",
         f"statuses           those proved from the solver's loads, compared with {reference};",
         f"                   a contact differs if one solver gives it more than {CARRIES:g} of the",
         f"                   largest load, and the other solver less than {CARRIES / 10:g}",

@@ -110,7 +110,7 @@ def test_cbf(name: str, pack: Path, index: Any) -> None:
     """Through a reader of CBF that shares nothing with our writer."""
     about = program(index, name, "cbf")
     problem, (variables,), *_ = import_cbf(str(pack / f"{name}.cbf"))
-    assert len(variables) == about["variables"] + 1  # the last one is the quadratic term
+    assert len(variables) == about["variables"]  # the last one is the quadratic term
     solvers = [name for name in ("cvxopt", "ecos") if find_spec(name)]  # ECOS has no wheel for 3.13
     for solver in solvers:
         settings = {"rel_bnb_opt_tol": None, "abs_prim_fsb_tol": 1e-8, "verbosity": 0}
