@@ -54,7 +54,7 @@ def corner(d: NDArray[np.complex128]) -> list[Array]:
 #: weights by the linear program.
 EQUAL, LIGHTEST = "equal", "lightest"
 
-#: Numbers of neighbours, moments of the weights or one of these words, and whether the mean of the
+#: Numbers of neighbours, moments of the weights or one of these names, and whether the mean of the
 #: neighbours decides what is outward. They are tried until the bound 1 - q_i suffices. A try also
 #: uses the asperities that determined q_i in earlier tries.
 TRIES: tuple[tuple[int, Moments | str, bool], ...] = (
