@@ -123,8 +123,8 @@ class Contacts(Table):
     def warnings(self) -> tuple[str, ...]:
         """The warnings: a line for each kind (its text without numbers), with the first scene."""
         kinds = dict[str, list[str]]()
-        pressed_to = zip(self.scenes, self.asperity_loads, self.approaches.tolist(), strict=True)
-        for k, known in enumerate(pressed_to):
+        given = zip(self.scenes, self.asperity_loads, self.approaches.tolist(), strict=True)
+        for k, known in enumerate(given):
             pressed = "undecided" in self.status[k]
             for line in self[k].warnings if pressed else cautions_about(*known):
                 kinds.setdefault(re.sub(r"\d\S*", "", line), []).append(f"scenes[{k}]: {line}")

@@ -185,8 +185,8 @@ def rim_touching(scene: Scene, touching: NDArray[np.bool_], approach: float) -> 
     """Fraction that touches of the rim (the farthest in each of 16 sectors); 0 without an array, or
     if asperities are equal and none of the same pattern beyond the rim could touch.
     """
-    layout, tips = scene.asperities.layout, scene.asperities
-    equal = np.ptp(tips.heights) == 0 == np.ptp(tips.tip_radii)
+    layout, asperities = scene.asperities.layout, scene.asperities
+    equal = np.ptp(asperities.heights) == 0 == np.ptp(asperities.tip_radii)
     if not is_array(scene) or (equal and scene.reach(approach) <= layout.filled * (1 + 1e-9)):
         return 0.0
     return float(touching[layout.rim].mean())

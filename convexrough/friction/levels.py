@@ -171,9 +171,9 @@ def is_gross(displacement: float, farthest: Ball) -> bool:
     Raises InputError for larger X.
     """
     if not displacement <= (most := float(farthest.value)) * (1 + 1e-14):
-        found, least = (f"{float(x)!r}".removesuffix(".0") for x in (displacement, most))
-        found, expected = f"{found}: gross sliding", f"at most X = {least}, at which it starts"
-        raise InputError("displacement", found=found, expected=expected)
+        given, start = (repr(float(x)).removesuffix(".0") for x in (displacement, most))
+        expected = f"at most X = {start}, at which it starts"
+        raise InputError("displacement", found=f"{given}: gross sliding", expected=expected)
     left = (farthest - Ball.exact(displacement)).value
     return not left > AT_THE_END * ROUNDOFF * displacement
 
