@@ -206,7 +206,9 @@ def exactly_one(first: str, a: object, second: str, b: object) -> None:
         raise InputError(f"{first}, {second}", found=found, expected="exactly one of the two")
 
 
-def fits_in_memory(what: str, count: float, bytes_each: float, power: int = 1) -> None:
+def fits_in_memory(
+    what: str, count: float, bytes_each: float, power: int = 1, noun: str = "asperities"
+) -> None:
     """Raise InputError if bytes_each * count^power exceeds the memory available."""
     count = float(count)
     needed = bytes_each * count**power
@@ -219,7 +221,7 @@ def fits_in_memory(what: str, count: float, bytes_each: float, power: int = 1) -
         most = (available / bytes_each) ** (1.0 / power)
         raise InputError(
             what,
-            found=f"{count:.3g} asperities ({needed / 2**30:.3g} GiB)",
+            found=f"{count:.3g} {noun} ({needed / 2**30:.3g} GiB)",
             expected=f"at most {most:.3g} for the {available / 2**30:.3g} GiB of memory available",
         )
 

@@ -280,6 +280,7 @@ def loops(
     if any(np.ptp(each.loads) > 0 for each in cycles):
         raise InputError("cycles", found="a load that varies", expected="cycles at constant load")
     chosen = indices("asperities", asperities, len(contact.scene))
+    checks.fits_in_memory("points", points, 200 * len(contact.scene), noun="levels")
     levels, f = contact.cached(FrictionLevels), Fraction(checks.friction(contact.scene.friction))
     loaded = levels.to_scene(levels.top.loads.value > 0)[chosen]
     widest = max(each.force_amplitude for each in cycles)

@@ -55,7 +55,7 @@ def elliptic_path(
     >>> len(loads), float(loads.max())
     (12, 1.5)
     """
-    checks.fits_in_memory("chords", checks.whole("chords", chords, 6), 200)
+    checks.fits_in_memory("chords", checks.whole("chords", chords, 6), 200, noun="chords")
     p = checks.finite("load_amplitude", load_amplitude)
     q = checks.finite("force_amplitude", force_amplitude)
     t, phase = q / checks.positive("friction", friction), checks.phase("phase", phase)

@@ -135,3 +135,10 @@ def test_loops_are_the_history_that_they_stand_for(influence: str, high: float, 
     theirs = np.where(loaded, past.asperity_displacements[body][:, chosen], 0.0)
     assert_allclose(loop.asperity_displacements, theirs, atol=1e-11 * scale)
     assert loop.asperities.tolist() == chosen
+
+
+def test_a_loop_of_more_points_than_fit_in_memory() -> None:
+    scene = cr.Scene(1.0, cr.Asperities([[0.0, 0.0]], 0.02), cr.Material(1.0, 0.3), 0.5)
+    cycle = cr.cycle(cr.press(scene, load=1.0), maximum=0.1)
+    with pytest.raises(cr.InputError, match=r"points: found 1e\+15 levels \("):
+        cycle.loop(points=10**15)
