@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks, solvers, threads
 from convexrough.arithmetic.balls import Ball
-from convexrough.arrays import Array, frozen
+from convexrough.arrays import Array, Indices, frozen
 from convexrough.cached import Cached
 from convexrough.convex.newton_step import correct
 from convexrough.errors import InputError, ProofError, SolverError
@@ -60,12 +60,6 @@ class Contact(Cached, Table, Plottable):
     approach      : [length] approach D0 of the two bodies;  load : [force] total load
     prescribed_load : [force] the load if it was prescribed; None if the approach was prescribed
     certificate   : what is proved about the loads, independent of the solver
-    model_error   : point forces in place of pressures make displacements at loaded asperities
-        slightly wrong; this is an estimate of the largest relative error (the largest of
-        `surface.model_errors`)
-    crowding      : largest (a_i + a_j) / r_ij over pairs of touching asperities, with contact radii
-        a and distances r; 0 if fewer than two touch. If it exceeds 1, contact discs overlap and the
-        model fails
     candidates    : number of asperities that the solver included; all others are proved open
     influence     : the compliance operator: "dense", "lattice" or "scattered"
     solver : name of the solver, with " + refinement" if Newton steps corrected a user's loads
@@ -76,7 +70,7 @@ class Contact(Cached, Table, Plottable):
     contact open 0.0536
     """
 
-    _shown = ("status",)
+    _shown = ("status", "model_error", "crowding")
     _along: ClassVar[Along] = {
         ("asperity",): ("status", "loads", "contact_radii", "mean_pressures", "gaps")
     }
@@ -87,8 +81,6 @@ class Contact(Cached, Table, Plottable):
     approach: float
     load: float
     certificate: Certificate
-    model_error: float
-    crowding: float
     candidates: int
     influence: Kind
     solver: str
@@ -110,6 +102,21 @@ class Contact(Cached, Table, Plottable):
     def area(self) -> float:
         """[length^2] total contact area: the sum of the areas of the contact discs."""
         return total_area(self.contact_radii)
+
+    @cached_property
+    def model_error(self) -> float:
+        """Estimate of the largest relative error of displacements at loaded asperities because
+        forces act at points (the largest of `surface.model_errors`).
+        """
+        return float(model_errors(self).max(initial=0.0))
+
+    @cached_property
+    def crowding(self) -> float:
+        """Largest (a_i + a_j) / r_ij over pairs of touching asperities, with contact radii a and
+        distances r; 0 if fewer than two touch. Above 1 contact discs overlap and the model fails.
+        """
+        loaded, A = among_loaded(self)
+        return A.crowding(self.contact_radii[loaded]) if len(loaded) > 1 else 0.0
 
     @cached_property
     def covered(self) -> int:
@@ -341,7 +348,6 @@ def _contact(
             solution = replace(solution, loads=state.loads.high)
         loads = frozen(problem.to_scene(solution.loads * force))
         radii = discs_of(scene, loads)
-        model_error, crowding = _model_limits(problem, solution, radii[problem.candidates])
         LOGGER.info("certifying")
         if refine:
             assert state is not None
@@ -358,8 +364,6 @@ def _contact(
         approach=certificate.approach,
         load=float(loads.sum()),
         certificate=certificate,
-        model_error=model_error,
-        crowding=crowding,
         candidates=len(problem),
         influence=problem.influence.name,
         solver=solver.name + (" + refinement" if refine and not said else ""),
@@ -392,22 +396,32 @@ def _solved(solver: Solver, problem: NormalProblem, start: Array | None) -> Solu
     return replace(solution, loads=loads)
 
 
-def _model_limits(problem: NormalProblem, solution: Solution, radii: Array) -> tuple[float, float]:
-    """`model_error` and `crowding` of `Contact`, from the candidates' contact radii [length]."""
-    prescribed = solution.approach + problem.offsets
-    touching = np.flatnonzero((solution.loads > 0) & (prescribed > 0))
-    if len(touching) < 2:
-        return 0.0, 0.0
-    all_touch = len(touching) == len(problem)
-    A = problem.influence if all_touch else problem.influence.restricted(touching)
-    a = radii[touching]
-    moved = discs_as_points(A, solution.loads[touching], a)
-    return float((moved / prescribed[touching]).max()), A.crowding(a)
+def among_loaded(contact: Contact) -> tuple[Indices, Influence]:
+    """(m,) the loaded asperities with D0 + d_i > 0, and the compliance operator among them."""
+    prescribed = contact.approach + contact.scene.offsets
+    loaded = np.flatnonzero((contact.loads > 0) & (prescribed > 0))
+    scale = 1.0 / (np.pi * contact.scene.material.contact_modulus)
+    return loaded, couple(contact.scene, loaded, scale, contact.influence)
 
 
-def discs_as_points(A: Influence, loads: Array, radii: Array) -> Array:
-    """(n,) upper bounds on the displacements by which point forces differ from discs."""
-    return A.scale * A.falloff(loads * radii**2 / 10, 3)
+def model_errors(contact: Contact) -> Array:
+    """(n,) relative model error of each asperity, 0 if open; the largest is `Contact.model_error`.
+
+    The Hertz pressure of a neighbour at the distance r_ij, with the contact radius a_j and the load
+    P_j, displaces the surface more than a point force P_j does. The difference is
+    a_j^2 / (10 r_ij^2) times P_j / (pi E* r_ij). The model error is the sum over neighbours divided
+    by D0 + d_i, with the approach D0 and the entry d_i of `Scene.offsets`.
+
+    >>> print(f"{cr.surface.model_errors(contact).max() / contact.model_error:.6g}")
+    1
+    """
+    checks.instance("contact", contact, Contact)
+    (loaded, A), errors = among_loaded(contact), np.zeros(len(contact.scene))
+    if len(loaded) > 1:
+        discs = contact.loads[loaded] * contact.contact_radii[loaded] ** 2 / 10
+        moved = A.scale * A.falloff(discs, 3)
+        errors[loaded] = moved / (contact.approach + contact.scene.offsets[loaded])
+    return frozen(errors)
 
 
 def covered(scene: Scene, radii: Array) -> int:

@@ -173,8 +173,8 @@ class Table(Record):
         return places | arrays if rows_first else arrays | places
 
     def _attributes(self) -> dict[str, Any]:
-        """The fields whose value is one number or one text, by name."""
-        values = self.__getstate__()
+        """The fields whose value is one number or one text, by name, after the `_shown` ones."""
+        values = {name: getattr(self, name) for name in self._shown} | self.__getstate__()
         return {name: it for name, it in values.items() if isinstance(it, (str, int, float))}
 
 

@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 
 from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
-from convexrough.contact import Contact, discs_as_points
+from convexrough.contact import Contact
 from convexrough.errors import SolverError
-from convexrough.influence import couple
 from convexrough.plausibility import FEW
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
@@ -149,28 +148,6 @@ def crowded(contact: Contact, above: float = OVERLAP) -> tuple[Indices, Array]:
     worst = np.argsort(-values, kind="stable")
     worst = worst[values[worst] > above]
     return frozen(touching[pairs[worst]]), frozen(values[worst])
-
-
-def model_errors(contact: Contact) -> Array:
-    """(n,) relative model error of each asperity, 0 if open; the largest is `Contact.model_error`.
-
-    The Hertz pressure of a neighbour at the distance r_ij, with the contact radius a_j and the load
-    P_j, displaces the surface more than a point force P_j does. The difference is
-    a_j^2 / (10 r_ij^2) times P_j / (pi E* r_ij). The model error is the sum over neighbours divided
-    by D0 + d_i, with the approach D0 and the entry d_i of `Scene.offsets`.
-
-    >>> print(f"{cr.surface.model_errors(contact).max() / contact.model_error:.6g}")
-    1
-    """
-    checks.instance("contact", contact, Contact)
-    scene, touching = contact.scene, np.flatnonzero(contact.loads)
-    errors = np.zeros(len(scene))
-    if len(touching) > 1:
-        scale = 1 / (np.pi * scene.material.contact_modulus)
-        A = couple(scene, touching, scale, contact.influence)
-        found = discs_as_points(A, contact.loads[touching], contact.contact_radii[touching])
-        errors[touching] = found / (contact.approach + scene.offsets[touching])
-    return frozen(errors)
 
 
 def _pressed(summits: Summits, press: Press) -> tuple[int, int, str, *tuple[float, ...]]:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from convexrough.contact import Contact
+from convexrough.contact import Contact, model_errors
 from convexrough.errors import SolverError
 from convexrough.plausibility import FEW
 from convexrough.progress import LOGGER
@@ -23,7 +23,6 @@ from convexrough.surface.provability import (
     Press,
     Provability,
     crowded,
-    model_errors,
     provability,
 )
 from convexrough.surface.summits import Summits
