@@ -22,7 +22,7 @@ from convexrough import checks, threads
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices
-from convexrough.roundoff import ROUNDOFF
+from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene import neighbours
 
 #: Bound on the relative error of a computed 1 / (pi E* r) for exact points, in units of the
@@ -116,6 +116,12 @@ class Influence(Coupling):
         if self.point_error == 0:
             return entry_error(0.0, np.inf)
         return entry_error(self.point_error, float(self.separations().min(initial=np.inf)))
+
+    @property
+    def row_norm(self) -> float:
+        """Upper bound on the 2-norm of any row of A."""
+        squares = self.falloff(np.ones(len(self)), 2)
+        return self.scale * math.sqrt(squares.max(initial=0.0)) * (1 + SAFETY)
 
     @abstractmethod
     def restricted(self, which: Indices) -> Influence:

@@ -141,6 +141,10 @@ class LatticeInfluence(coupling.Influence):
         return np.maximum(total, 0.0) * (largest * stretched)
 
     @property
+    def row_norm(self) -> float:  # the kernel has all entries of a row, and more
+        return self._unit / self._least * self._kernel.norm * (1 + SAFETY)
+
+    @property
     def _unit(self) -> float:
         """The entry A_ij for two sites at the distance `spacing`."""
         return self.scale / self.lattice.spacing

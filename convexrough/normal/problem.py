@@ -14,7 +14,6 @@ conditions are the contact law, with the gaps g:
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any, Self
@@ -194,8 +193,7 @@ class NormalProblem:
     @cached_property
     def row_norm(self) -> Any:
         """Bound on the largest 2-norm of a row of A: a number, or (m, 1) for a stack."""
-        squares = self.influence.falloff(np.ones(len(self)), 2)
-        return self.influence.scale * math.sqrt(squares.max(initial=0.0)) * (1 + SAFETY)
+        return self.influence.row_norm
 
     @cached_property
     def largest_entry(self) -> Any:
