@@ -62,7 +62,7 @@ class Contact(Cached, Table, Plottable):
     certificate   : what is proved about the loads, independent of the solver
     candidates    : number of asperities that the solver included; all others are proved open
     influence     : the compliance operator: "dense", "lattice" or "scattered"
-    solver : name of the solver, with " + refinement" if Newton steps corrected a user's loads
+    solver : name of the solver, with " + refinement" if Newton steps changed a user's loads
     iterations, seconds : iterations of the solver; time [s] of `press` or `solve`
 
     >>> contact = cr.press(scene, approach=5e-5)
@@ -332,7 +332,7 @@ def _contact(
     problem: NormalProblem, solver: Solver, start: ArrayLike | None, began: float
 ) -> Contact:
     scene, force = problem.scene, problem.units.force
-    first, top = None, None
+    first, top, corrected = None, None, False
     if start is not None:
         given = checks.array("start", start, length=len(scene), sign="not negative")
         first = given[problem.candidates] / force
@@ -345,6 +345,7 @@ def _contact(
         if refine := bool(solution.refine and len(problem)):
             if state is None or not np.array_equal(state.loads.high, solution.loads):
                 state = refined_loads(problem, solution.loads, problem.pressed_product)
+            corrected = not np.array_equal(state.loads.high, solution.loads)
             solution = replace(solution, loads=state.loads.high)
         loads = frozen(problem.to_scene(solution.loads * force))
         radii = discs_of(scene, loads)
@@ -366,7 +367,7 @@ def _contact(
         certificate=certificate,
         candidates=len(problem),
         influence=problem.influence.name,
-        solver=solver.name + (" + refinement" if refine and not said else ""),
+        solver=solver.name + (" + refinement" if corrected and not said else ""),
         iterations=solution.iterations,
         seconds=time.perf_counter() - began,
         prescribed_load=None if problem.load is None else problem.load * force,

@@ -72,8 +72,8 @@ def wrong_loads(contact: Contact) -> Iterator[str]:
     proof, largest = contact.certificate, float(contact.loads.max())
     loaded = int(((contact.loads > 0) & (proof.status == "open")).sum())
     far = proof.load_error > INACCURATE * largest and "contact" in proof.status
-    if loaded or far:
-        off = f"{bound(100 * proof.load_error / (largest or 1.0), 2)} % of the largest load"
+    if largest and (loaded or far):  # `cautions` warns of loads that are all 0
+        off = f"{bound(100 * proof.load_error / largest, 2)} % of the largest load"
         yield (
             f"the loads err by up to {off}; asperities with a load that are proved open: "
             f"{loaded}; check the solver"
@@ -88,15 +88,15 @@ def doubts_of(contact: Contact) -> Iterator[str]:
         yield f"not certified: undecided asperities: {undecided}"
 
 
-def cautions_of(contact: Contact) -> Iterator[str]:
-    """The warnings of `wrong_loads` and `cautions` for a contact."""
+def cautions_of(contact: Contact, known: Mapping[str, Any] | None = None) -> Iterator[str]:
+    """The warnings of `wrong_loads` and `cautions` for a contact, whose limits may be `known`."""
     yield from wrong_loads(contact)
-    yield from cautions(limits_of(contact), contact.scene.units)
+    yield from cautions(known or limits_of(contact), contact.scene, contact.approach)
 
 
-def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
+def cautions(normal: Mapping[str, Any], scene: Scene, approach: float) -> Iterator[str]:
     """Warnings about the `limits` of the model, which the certificate does not cover."""
-    unit, modulus = units.unit("pressure"), normal["contact_modulus"]
+    unit, modulus = (units := scene.units).unit("pressure"), normal["contact_modulus"]
     if unit is not None and not RUBBER <= (pascals := modulus * float(unit.size)) <= DIAMOND:
         limit = f"softer than rubber, {RUBBER:g}" if pascals < RUBBER else f"above {DIAMOND:g}"
         yield (
@@ -109,7 +109,9 @@ def cautions(normal: Mapping[str, Any], units: UnitNames) -> Iterator[str]:
             f"{HIGH_FRICTION:g}; it is a ratio, not in per cent"
         )
     if normal["loaded"] == 0:
-        yield "no asperity carries a load: check the sign and unit of the approach"
+        overlaps = (scene.offsets + approach > 0).any()  # then loads that are all 0 are wrong
+        blamed = "loads" if overlaps else "sign and unit of the approach"
+        yield f"no asperity carries a load: check the {blamed}"
     elif normal["loaded"] < FEW:
         yield (
             f"asperities in contact: {normal['loaded']}, fewer than {FEW}: too few for a rough "
@@ -164,7 +166,7 @@ def cautions_about(scene: Scene, loads: Array, approach: float) -> list[str]:
     apart = scene.lattice is not None and 2 * radii.max() < 0.99 * scene.lattice.spacing
     near = 0.0 if apart else crowding(scene.contact_points, radii)
     found = limits(scene, loads, radii, near, covered(scene, radii), approach)
-    return [*cautions(found, scene.units)]
+    return [*cautions(found, scene, approach)]
 
 
 def is_array(scene: Scene) -> bool:

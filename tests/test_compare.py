@@ -232,10 +232,12 @@ MINE = """
 from dataclasses import replace
 import numpy as np
 from convexrough.solvers import Newton, Solution
+print("on import")
 
 class Mine:
     name = "mine"
     def solve(self, problem, start=None):
+        print("on solving")
         found = Newton().solve(problem)
         return replace(found, loads=self.changed(found.loads), refine=False, trial=None)
     def changed(self, loads):
@@ -266,6 +268,11 @@ class Words(Ones):
 class Refined(Ones):
     refine = {"refine": True}
 
+class Far(Refined):  # loads from which no Newton step leads to smaller residuals
+    def solve(self, problem, start=None):
+        loads = np.where(np.arange(len(problem)) == 0, 1e9, 0.0)
+        return Solution.of(problem, loads, problem.approach, 1, refine=True)
+
 class NoSolver: ...
 class NoName:
     def solve(self, problem, start=None): ...
@@ -282,6 +289,7 @@ def test_a_solver_of_ones_own_by_its_name(command: Any, tmp_path: Path, monkeypa
     (tmp_path / "scene.toml").write_text(scene_text())
     ran = command("compare", "scene.toml", "--solver", "desk_solvers.Mine", "--json")
     assert [each["solver"] for each in json.loads(ran.out)["compare"]] == ["newton", "mine"]
+    assert "on import\non solving\n" in ran.err
     wrong = command("compare", "scene.toml", "--solver", "desk_solvers.Zero")
     assert wrong.status == 3
     assert "zero disagrees: its loads differ from those of newton by 1 of the largest" in wrong.err
@@ -312,6 +320,8 @@ def test_a_solver_of_ones_own_by_its_name(command: Any, tmp_path: Path, monkeypa
     mine = json.loads(profiled.out)["profile"][1]
     assert mine["right"] == mine["contact set right"] == len(mine["outcomes"]) > 0
     both = [x for name in ("Ones", "Refined") for x in ("--solver", f"desk_solvers.{name}")]
+    far = command("compare", "scene.toml", "--solver", "desk_solvers.Far", "--json")
+    assert [each["solver"] for each in json.loads(far.out)["compare"]] == ["newton", "newton (2)"]
     names = ["newton", "newton (2)", "newton + refinement"]
     ran = command("compare", "scene.toml", *both, "--json")
     assert ran.status == 3

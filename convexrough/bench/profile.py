@@ -95,7 +95,7 @@ def profile_of(
         for row, entry in enumerate(compare(hard.scene, **hard.control, solvers=solvers).entries):
             outcomes[row, column] = entry.outcome
             if entry.contact is not None:
-                said[row] = entry.solver  # says whether the loads are refined
+                said[row] = max(said[row], entry.solver, key=len)  # with "+ refinement" if any is
                 checked = hard.check(entry.contact.loads, within=within)
                 sets[row, column] = not (len(checked.wrongly_open) or len(checked.wrongly_loaded))
                 outcomes[row, column] = "right" if checked.error <= within else "wrong"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager, redirect_stdout
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
@@ -169,16 +169,17 @@ def say_aside(*parts: str) -> None:
 
 @contextmanager
 def progress(message: str) -> Iterator[None]:
-    """Show a line on a terminal, with records of our logger, while the body of `with` runs."""
-    if not sys.stderr.isatty():
-        yield
-        return
-    from rich.console import Console
+    """Show a line on a terminal, with records of our logger, while the body of `with` runs.
 
-    from convexrough.progress import logged
+    What the body prints, such as a user's solver, goes to standard error.
+    """
+    with redirect_stdout(sys.stderr), ExitStack() as stack:
+        if sys.stderr.isatty():
+            from rich.console import Console
 
-    with (
-        Console(stderr=True).status(message) as status,
-        logged(lambda record: status.update(f"{message}: {record.getMessage()}")),
-    ):
+            from convexrough.progress import logged
+
+            line = stack.enter_context(Console(stderr=True).status(message))
+            told = logged(lambda record: line.update(f"{message}: {record.getMessage()}"))
+            stack.enter_context(told)
         yield

@@ -24,14 +24,15 @@ def run(output: common.Output, scene: Path) -> int:
     """
     from convexrough import checks
     from convexrough.plots.slider import slider_html
-    from convexrough.run.results import origin, prove_results
+    from convexrough.run.results import copied, origin, prove_results
     from convexrough.run.scene_file import has_sweep, read_scene
 
     if has_sweep(scene):
         if output.html or output.proof:
             raise click.UsageError("--proof and --html are options of one scene, not of a sweep.")
         return _swept(scene, output)
-    file = read_scene(scene)
+    with common.progress(f"reading {scene}"):
+        file = read_scene(scene)
     with blamed_on(scene):
         if output.html:
             checks.friction(file.scene.friction)
@@ -49,7 +50,7 @@ def run(output: common.Output, scene: Path) -> int:
             results = file.compute(contact)
             page = slider_html(contact, results[0].lines()) if output.html else None
             new.results(results, figures=not output.no_figures)
-            new.text("scene.toml", file.text)
+            new.text("scene.toml", copied(file))
             if page is not None:
                 new.text("slider.html", page)
         prove = partial(prove_results, results, partial(common.say_aside, "warning"))

@@ -39,7 +39,8 @@ def compare(
     from convexrough.run.results import write_rows
     from convexrough.run.scene_file import read_scene
 
-    chosen = [solver_named(name) for name in solvers] or None
+    with common.progress("importing solvers"):
+        chosen = [solver_named(name) for name in solvers] or None
     if log is not None and log.exists():
         raise FileError(f"{log}: exists already; name another file")
     file = read_scene(scene)
@@ -143,10 +144,10 @@ def gallery(
         raise click.UsageError("--export excludes --profile and --solver.")
     wanted = wing.names(*names)
     if profile or solvers:
-        chosen = [solver_named(each) for each in solvers]
         from convexrough.bench.profile import profile_of
 
         with common.progress("timing"):
+            chosen = [solver_named(each) for each in solvers]
             found = profile_of(chosen or None, cases=wanted)
         table = found.rows()
         cells = [[f"{x:.0%}" if isinstance(x, float) else x for x in row.values()] for row in table]

@@ -78,8 +78,9 @@ class _Reporting(click.Command):
 @common.option("--within PART", "Largest error allowed of a load or shear force, as a fraction of "
                "the largest one. If their sum is prescribed, its error counts as a fraction of it.",
                float, default=0.01, show_default=True)  # fmt: skip
-@common.option("--floor X", "Treat loads from -X to X as zero: their asperities are claimed to be "
-               "open.", float, default=0.0)  # fmt: skip
+@common.option("--floor X", "Count loads from -X to X, in the scene's unit of force, as 0: their "
+               "asperities are claimed to be open.", float, default=0.0, show_default=True
+               )  # fmt: skip
 @common.option("--tolerance X", "Largest distance of a position in the file from its asperity; "
                "default 1 % of the smallest distance of two asperities.", float)  # fmt: skip
 @common.option("--column NAME=COLUMN", "Read NAME (load, x, index, ...) from this column: a "

@@ -36,7 +36,9 @@ def cycle(
     """The steady cycle between two shear forces at constant load (docs/theory/losses.md).
 
     maximum, minimum : [force] largest and smallest shear force; the minimum defaults to -maximum
-    displacement     : [length] displacement amplitude of a symmetric cycle, instead of forces
+    displacement     : [length] displacement amplitude of a symmetric cycle, instead of forces. If
+        `order` is "fails", the force is that of the memory curve, which only approximates it:
+        `displacement_amplitude` of the result then differs from it, in a test by 5e-5 of it
 
     As in `shear`, a force or displacement that differs only by rounding from its value at the onset
     of gross sliding is replaced by that value, also in the result.

@@ -244,6 +244,13 @@ def origin(source: SceneFile) -> Summary:
     }
 
 
+def copied(source: SceneFile) -> str:
+    """The text for a copy of a scene file; the first line says where to run it if it has a path."""
+    folder = str(source.path.parent.absolute())
+    said = f"# A copy; to run it, move it to {folder!r}: `path` is relative to that folder.\n"
+    return said * (len(source.inputs) > 1) + source.text
+
+
 def versions() -> dict[str, str]:
     """The versions of the packages in `NUMERICAL`, by name."""
     return {name: metadata.version(name) for name in NUMERICAL}

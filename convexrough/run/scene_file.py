@@ -17,6 +17,7 @@ from convexrough.errors import FileError, InputError, SceneFileError, blamed_on,
 from convexrough.influence import Kind
 from convexrough.normal.load_control import all_that_could_touch
 from convexrough.normal.problem import NormalProblem
+from convexrough.progress import LOGGER
 from convexrough.record import Record
 from convexrough.run.asperity_file import read_summits
 from convexrough.scene.asperities import CUT_DEVIATIONS, Asperities, largest_tip_radius
@@ -82,7 +83,11 @@ class Task(Record):
 
         Raises InputError and SolverError.
         """
-        return [stage.compute(contact) for stage in self.stages.values()]
+        results: list[Result] = []
+        for name, stage in self.stages.items():
+            LOGGER.info(f"[{name}]")
+            results.append(stage.compute(contact))
+        return results
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)

@@ -68,8 +68,10 @@ class BodiesTable(FileTable):
         return Material.pair(self.sphere.made(), self.base.made())
 
 
-#: Keys of asperities in a pattern that a table of asperities from a file does not have.
-LATTICE = frozenset(("spacing", "within", "height_std", "tip_radius_cv", "seed"))
+#: Keys of random heights and tip radii, which need a seed; and keys of asperities in a pattern that
+#: a table of asperities from a file does not have.
+RANDOM = ("height_std", "tip_radius_cv")
+LATTICE = frozenset(("spacing", "within", *RANDOM, "seed"))
 
 
 class SummitsTable(FileTable):
@@ -82,7 +84,7 @@ class SummitsTable(FileTable):
 
 
 class LatticeTable(FileTable):
-    needs: ClassVar[Mapping[str, str]] = {"height_std": "seed", "tip_radius_cv": "seed"}
+    needs: ClassVar[Mapping[str, str]] = dict.fromkeys(RANDOM, "seed")
     elsewhere = ("this pattern", frozenset(SummitsTable.model_fields))
     pattern: Pattern
     spacing: Positive
@@ -92,6 +94,12 @@ class LatticeTable(FileTable):
     tip_radius_cv: values.Variation = 0.0
     seed: values.Whole | None = None
     geometry: Geometry = "closest"
+
+    @classmethod
+    def mistakes_between(cls, keys: Mapping[str, Any]) -> Iterator[Mistake]:
+        yield from super().mistakes_between(keys)
+        if "seed" in keys and keys.keys().isdisjoint(RANDOM):
+            yield "seed", f"not used without {' or '.join(RANDOM)}"
 
 
 class FrictionTable(FileTable):

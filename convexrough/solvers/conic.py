@@ -62,7 +62,7 @@ class TooDenseError(InputError):
     asperities : (m,) the indices of these asperities in the scene
     ratios     : (m,) for each, an estimate of the contact radius that it would have if its box did
         not limit its load, divided by (pi/2) s_i, where s_i is half the distance to the nearest
-        neighbour. The form with five cones needs ratios below 1
+        neighbour. Ratios must be below 1 for the form with five cones, 0.99 for bristles
 
     >>> blunt = cr.Asperities(scene.asperities.positions, tip_radii=0.6)
     >>> crowded = cr.Scene(1.0, blunt, cr.Material(1.0, 0.3), geometry="summit")
@@ -78,8 +78,8 @@ class TooDenseError(InputError):
         more = f" and {len(ratios) - len(worst)} more" if len(ratios) > len(worst) else ""
         super().__init__(
             "asperities too dense for a convex program",
-            found=f"{len(ratios)}, by index with the contact radius divided by pi/4 times the "
-            f"distance to the nearest neighbour: {described}{more}",
+            found=f"{len(ratios)}, by index with an estimate of the contact radius divided by pi/4 "
+            f"times the distance to the nearest neighbour: {described}{more}",
             expected=f"less than {limit:g}; Newton's method has no such limit",
             where=solver,
         )

@@ -225,11 +225,13 @@ def _pressed_by(scanned: Scanned) -> Iterator[tuple[str, str]]:
         return
     radii, angle = found
     own = _radii(along(scanned.contact.scene.sphere_radius))
-    both = _radii(radii) if max(radii) > 0 else "no hill"
+    both = _radii(radii) if max(radii) > 0 else "no positive radius"
     said = f"{own}; {both} with the removed form, unless {own} contains it already"
     if angle and max(radii) > 0:
         said += f"; the axis of the first is at {angle:.3g}° from x: "
         said += f"turn x and y of the summits by {-angle:.3g}°"
+    if max(radii) <= 0:
+        said += "; the form is a hollow that is sharper than the body: [sphere] cannot describe it"
     if min(radii) < 0 < max(radii):
         said += "; [sphere] accepts no negative radius, but inf for a flat direction"
     yield "pressing radius", said

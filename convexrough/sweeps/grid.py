@@ -15,6 +15,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
+from convexrough.run.study import RANDOM
 from convexrough.run.values import FileTable, Mistake, expected
 from convexrough.scene.asperities import CUT_DEVIATIONS
 
@@ -189,8 +190,10 @@ def with_values(
             table[name] = {**table.get(name, {})}
             table = table[name]
         table[last] = value
-    if seed is not None and made.get("asperities", {}).get("pattern") != "file":
-        made.setdefault("asperities", {})["seed"] = seed
+    layout = made.get("asperities", {})
+    is_random = layout.get("pattern") != "file" and not layout.keys().isdisjoint(RANDOM)
+    if seed is not None and is_random:
+        layout["seed"] = seed
     return made
 
 

@@ -17,7 +17,7 @@ from convexrough.errors import InputError, MistakesError, SceneFileError, blamed
 from convexrough.run.scene_file import Task, digest, read_text, tables_of
 from convexrough.run.stage import Stage
 from convexrough.run.stages import CycleStage, NormalStage, ShearStage
-from convexrough.run.study import Study, validate, validate_table
+from convexrough.run.study import RANDOM, Study, validate, validate_table
 from convexrough.scene.scene import Scene
 from convexrough.solvers import Newton
 from convexrough.sweeps.batch import VERSIONS, Batch, Source, Tables, Tasks
@@ -94,7 +94,7 @@ def _nothing_random(contents: Mapping[str, Any]) -> Iterator[str]:
     table = table_in(contents, "sweep")
     given = {*table_in(contents, "asperities")}
     given |= {key.removeprefix("asperities.") for _, key in swept(table)}
-    if "seeds" in table and not table.get("draw") and not given & {"height_std", "tip_radius_cv"}:
+    if "seeds" in table and not table.get("draw") and given.isdisjoint(RANDOM):
         yield (
             "[sweep] seeds: nothing is random: expected height_std or tip_radius_cv in "
             "[asperities], or a table [sweep.draw]"

@@ -25,9 +25,10 @@ from convexrough.tabular.units import bare, unit
 TOTALS = ("sum", "total", "totals", "grand total", "summe", "gesamt", "somme", "suma",
           "mean", "average", "max", "min", "maximum", "minimum")  # fmt: skip
 
-#: Number of mistakes of one file that are shown; and number of cells such as 1.013 with which one
-#: whole number below 100 in their column is enough to show that the mark separates thousands.
-MOST_MISTAKES, SURELY_GROUPED = 10, 10
+#: Number of mistakes of one file that are shown; number of cells such as 1.013 with which one whole
+#: number below 100 in their column is enough to show that the mark separates thousands; and number
+#: of columns above which a file without names of columns may be a map.
+MOST_MISTAKES, SURELY_GROUPED, MOST_NUMBERED = 10, 10, 10
 
 _WHOLE, _HUNDREDS = re.compile(r"[+-]?\d{1,3}"), re.compile(r"[+-]?(?!999)[1-9]\d\d")
 
@@ -126,6 +127,9 @@ def read_table(
     naming = "save vectors with these names" if arrays else "add a first row with names"
     advice = ": rename one" if source.header else f": {naming}"
     advice = "" if how.scalable else advice
+    if instead and source.header is None and len(source.columns) > MOST_NUMBERED:
+        kind = "arrays of an .npz file" if arrays else "columns"
+        advice = f"; a map of pressures also needs coordinates: x, y and pressure as {kind}"
     mistakes += [
         f"columns: found {source.named()}, expected a column {each!r}"
         + advice

@@ -53,6 +53,9 @@ def test_where_order_fails() -> None:
     assert set(path.status.ravel()) == {"undecided"}
     fine = cr.load_path(contact.scene, loads=P, forces=Q, general_steps=32)
     X = np.abs(path.displacements).max()
+    cycle = cr.cycle(contact, displacement=X / 2)
+    assert (cycle.order, cycle.displacement_error) == ("fails", np.inf)
+    assert cycle.displacement_amplitude == pytest.approx(X / 2, rel=1e-4)
     assert_allclose(path.displacements, fine.displacements, atol=2e-3 * X)
     bristles = Bristles(contact, count=260, reach=1.3)
     for k in (1, 2):

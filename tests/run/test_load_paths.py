@@ -12,6 +12,7 @@ from scene_files import EVERYTHING, FRICTION, HEXAGONAL, WITHIN, put, rows, scen
 
 import convexrough as cr
 from convexrough.friction import general_step
+from convexrough.progress import logged
 
 SCENE = scene_text(WITHIN, more=EVERYTHING)
 
@@ -55,6 +56,7 @@ def test_nothing_is_proved_where_order_fails(run: Any, command: Any, monkeypatch
     load = json.loads(run(SHADED, "--json").out)["normal"]["load"]
     outcome = run(SHADED + STAGES.replace("LOAD", repr(load)), "--out", "out")
     assert outcome.status == 3
+    assert repr(str(Path().absolute())) in Path("out/scene.toml").read_text().splitlines()[0]
     summary = json.loads(Path("out/summary.json").read_text())
     for stage in ("path", "steady", "shakedown"):
         assert summary[stage]["order"] == "fails"
@@ -80,7 +82,10 @@ def test_what_is_only_checked_is_not_certified(tmp_path: Path) -> None:
     """Each stage rests on its order, and shakedown on its bounds, too."""
     (tmp_path / "scene.toml").write_text(SCENE)
     file = cr.read_scene(tmp_path / "scene.toml")
-    results = file.compute(file.press())
+    contact, said = file.press(), list[str]()
+    with logged(lambda record: said.append(record.getMessage())):
+        results = file.compute(contact)
+    assert [f"[{name}]" for name in file.stages] == [it for it in said if it.startswith("[")]
     assert all(result.certified for result in results)
     results = [result for result in results if result.name in RESTING]
     assert len(results) == len(RESTING)

@@ -35,6 +35,7 @@ MISTAKES = [
     (layout("spacing = 1\ntip_radius = [1, -2]"),
      "[asperities] tip_radius[1]: found -2, expected a positive"),
     (layout("spacing = 1\nheight_std = 1"), "[asperities] seed: missing, needed with height_std"),
+    (layout("spacing = 1\nseed = 1"), "[asperities] seed: not used without height_std or tip_rad"),
     (layout("spacing = 1\ntip_radius_cv = 10\nseed = 1"),
      "[asperities] tip_radius_cv: found 10, expected a standard deviation over the mean"),
     (layout('spacing = 1\npath = "a.csv"'), "[asperities] path: not used with this pattern"),

@@ -3,6 +3,7 @@
 import hashlib
 import json
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from scene_files import FRICTION, HEXAGONAL, scene_text
 import convexrough as cr
 from convexrough.atomic import replacing
 from convexrough.run.results import MANIFEST, results_folder
+from convexrough.solvers import Solution
 
 
 def test_a_file_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
@@ -134,6 +136,8 @@ def test_an_array_that_ends_inside_the_contact_is_told() -> None:
     rim = "contact reaches the rim of the array, which is at 0."
     sites = 1e-3 * np.stack(np.meshgrid(*2 * [np.arange(-7, 8)]), axis=-1).reshape(-1, 2)
     square, corner = cr.Asperities(sites, 0.02), cr.Asperities(wide.positions + 0.0102, 0.02)
+    zero = SimpleNamespace(name="zero", solve=lambda problem, _: Solution(
+        np.zeros(len(problem)), problem.approach, 1, np.inf))  # fmt: skip
     for array, base, control, told in (
         *((wide, wrong, {"approach": 5e-5}, rim) for wrong in (1e3, (1.0, 2e3))),
         (wide, (1.0, 2.0), {"approach": 2e-5}, ""),
@@ -144,6 +148,7 @@ def test_an_array_that_ends_inside_the_contact_is_told() -> None:
         (wide, (np.inf, 1.0), {"approach": 5e-5}, "the ends of the array along the axis of the"),
         (wide, np.inf, {"approach": 1e-6}, ""),
         (wide, 1.0, {"approach": -1e-6}, "no asperity carries a load: check the sign and unit"),
+        (wide, 1.0, {"approach": 1e-6, "solver": zero}, "carries a load: check the loads"),
         (few, 1.0, {"approach": 1e-5}, ""),
         (few, 1.0, {"approach": 1.5e-5}, "100% of the asperities at the rim"),
         (few, 1.0, {"approach": 1.1e-5}, ""),  # all touch, and all of the pattern that could

@@ -268,6 +268,7 @@ def test_heights_far_from_zero(find: Any, surface: cr.surface.Surface) -> None:
         ((1 / 3e3, 0.0), 0.0, (2307.7, 1e4), ""),
         ((1 / 3e3, 1 / 6e3), 30.0, (2307.7, 3750.0), "turn x and y of the summits by -[23]"),
         ((1 / 3e3, -1 / 3e3), 0.0, (2307.7, -4285.7), "accepts no negative radius, but inf for a"),
+        ((-1 / 3e3, -1 / 3e3), 0.0, (-4285.7, -4285.7), "10000; no positive radius with .* hollow"),
     ],
 )
 def test_the_body_with_a_removed_paraboloid(

@@ -57,6 +57,7 @@ def test_whatever_numbers_depend_on_is_in_the_hash(tmp_path: Path) -> None:
     found = [
         identity(SMALL),
         identity(tables(sphere={"radius": 1.1})),
+        identity(sweeping(seeds=2, draw={"sphere.radius": {"uniform": [1, 2]}})),  # no heights
         identity(tables(cycle={"maximum_fraction": [0.38]})),
         *(identity(tables(sweep={"seeds": seeds})) for seeds in (5, [0, 1, 2, 4])),
         *(identity(tables(sweep=table)) for table in ({"measure": ["load"]}, {"over": over})),

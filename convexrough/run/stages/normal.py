@@ -71,8 +71,7 @@ class NormalResult(Result):
         return plausibility.doubts_of(self.contact)
 
     def cautions(self) -> Iterator[str]:
-        yield from plausibility.wrong_loads(self.contact)
-        yield from plausibility.cautions(self.known[0], self.contact.scene.units)
+        return plausibility.cautions_of(self.contact, self.known[0])
 
     def figures(self) -> Mapping[str, Any]:
         return plots.press_figures(self.contact)
