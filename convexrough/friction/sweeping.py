@@ -66,7 +66,7 @@ TRIES: tuple[tuple[int, Moments | str, bool], ...] = (
 
 MORE, FEW = 32, 300  # more than MORE neighbours are tried only if at most FEW asperities remain
 ALONE = 6  # neighbours of an asperity outside the contact that are tried, each alone
-NEAR = 7  # where (7) proves (6) far away, (6) is computed for NEAR times as many as have weights
+NEAR = 8  # where (7) proves (6) far away, (6) is computed for NEAR times as many as have weights
 NEAR_EQUAL = 24  # the number of asperities for which (6) is computed if the weights are equal
 SEARCHES = 15  # systems solved for weights; each leaves out earlier neighbours of negative weight
 SAMPLE = 300  # the linear program considers about twice as many asperities
@@ -91,26 +91,8 @@ def swept_rates(influence: Influence, c: Array, rates: Array, spare: Array) -> A
     rates[others] = swept.outside(others)
     for group in (support, others):
         left = group[~(rates[group] > least[group])]
-        worst = np.empty((len(left), 0), dtype=np.intp)
-        for count, moments, by_near in TRIES:
-            if len(left) == 0 or (count > MORE and len(left) > FEW):
-                break
-            failed = np.empty(len(left), dtype=np.intp)
-            for some in threads.chunks(len(left), ROWS):
-                which = left[some]
-                near = np.column_stack((swept.neighbours(which, count), worst[some]))
-                if moments == EQUAL:
-                    weights = swept.equal(which, near, count)
-                elif callable(moments):
-                    make = partial(swept.weights, moments, by_near)
-                    weights = _in_parts(make, (near.shape[1] + 5) ** 2, which, near)
-                else:
-                    weights = swept.lightest(which, near)
-                checked = NEAR_EQUAL if moments == EQUAL else NEAR * near.shape[1]
-                found = swept.rates(which, near, weights, least[which], checked)
-                rates[which], failed[some] = found
-            todo = ~(rates[left] > least[left])
-            left, worst = left[todo], np.column_stack((worst, failed))[todo]
+        for some in threads.chunks(len(left), ROWS):
+            swept.improve(rates, left[some], least)
         if not (rates[support] > 0).all():
             return np.full(len(rates), -np.inf)
     return rates
@@ -203,6 +185,32 @@ class _Swept:
         found = (clear & (nearer > 2 * self.lost * self.extent**2)).any(axis=1)
         return np.where(found, self.lost / 2, -np.inf)
 
+    def improve(self, rates: Array, which: Indices, least: Array) -> None:
+        """Increase the bounds `rates` (n,) of asperities, try by try, until they exceed `least`."""
+        worst = near = np.empty((len(which), 0), dtype=np.intp)
+        for count, moments, by_near in TRIES:
+            if len(which) == 0 or (count > MORE and len(which) > FEW):
+                break
+            width = count + worst.shape[1]
+            checked = NEAR_EQUAL if moments == EQUAL else NEAR * width
+            if near.shape[1] < min(checked, len(self.support) - 1):
+                near = self.neighbours(which, checked)
+            charged = np.column_stack((near[:, :count], worst))
+            if moments == EQUAL:
+                weights = self.equal(which, charged)
+            elif callable(moments):
+                make = partial(self.weights, moments, by_near)
+                weights = _in_parts(make, (width + 5) ** 2, which, charged)
+            else:
+                weights = self.lightest(which, charged)
+            rates[which], failed = self.rates(
+                which, charged, weights, least[which], near[:, :checked]
+            )
+            todo = ~(rates[which] > least[which])
+            if moments != EQUAL:
+                worst = np.column_stack((worst, failed))
+            which, worst, near = which[todo], worst[todo], near[todo]
+
     def weights(self, moments: Moments, by_near: bool, which: Indices, near: Indices) -> Array:
         """(m, s) weights of least energy of the neighbours `near`; 0 where none are found."""
         (m, s), here = near.shape, self.places[which]
@@ -242,13 +250,13 @@ class _Swept:
         weights[off > 1e-9] = 0.0
         return weights
 
-    def equal(self, which: Indices, near: Indices, count: int) -> Array:
-        """(m, s) equal weights of the first neighbours, where the moments of `around` are 0."""
-        d = self.places[near[:, :count]] - self.places[which][:, None]
+    def equal(self, which: Indices, near: Indices) -> Array:
+        """(m, s) equal weights of the neighbours `near`, where the moments of `around` are 0."""
+        d = self.places[near] - self.places[which][:, None]
         size = np.abs(d).max(axis=1)
         off = np.abs(d.sum(axis=1)) / size + np.abs((d * d).sum(axis=1)) / size**2
         weights = np.zeros(near.shape)
-        weights[off < 1e-9, :count] = 1.0
+        weights[off < 1e-9] = 1.0
         return weights
 
     def lightest(self, which: Indices, near: Indices) -> Array:
@@ -268,7 +276,7 @@ class _Swept:
         return weights
 
     def rates(
-        self, which: Indices, near: Indices, weights: Array, least: Array, checked: int
+        self, which: Indices, near: Indices, weights: Array, least: Array, seen: Indices
     ) -> tuple[Array, Indices]:
         """(m,) lower bounds 1 - q_i, and the k that determine q_i; -inf where no weights were found
         or where, without (7), near asperities show that the bound is not above `least` (m,).
@@ -277,7 +285,7 @@ class _Swept:
         known = np.flatnonzero(weights.any(axis=1))
         mine, near = which[known], near[known]
         weights = weights[known] / weights[known].sum(axis=1, keepdims=True)
-        seen = self.neighbours(mine, checked)
+        seen = seen[known]
         cost = near.shape[1] * seen.shape[1]
         ratios = _in_parts(self._ratios, cost, mine, near, weights, seen)
         rows, smallest = np.arange(len(known)), ratios.argmin(axis=1)
@@ -305,20 +313,20 @@ class _Swept:
 
         def behind(direction: NDArray[np.complex128]) -> Array:
             past = (direction.conj() * here).real - self._least_along(direction)
-            return np.asarray(np.maximum(past, 0.0) + rounding * self.extent)
+            return np.asarray(past + rounding * self.extent)
 
         m = behind(first)
         turned = first * np.exp(1j * TURN), first * np.exp(-1j * TURN)
-        ahead = size * r * np.sin(TURN) - np.maximum(*map(behind, turned))
+        ahead = size * r * np.sin(TURN) - np.maximum(*map(behind, turned)).clip(0.0)
         third = 3 / 8 * total(apart**2 * d) + 5 / 8 * total(d**3)
         with np.errstate(divide="ignore", invalid="ignore"):
             rest = total(apart**4 / np.maximum(r[:, None] - apart, 0.0))
             s = -(weights * d**2).sum(axis=1) * (first.conj() / size) ** 2
-            beyond = m / size / r
+            beyond = np.maximum(m, 0.0) / size / r
             across = s.real * (1.0 - 2.0 * beyond**2) - 2.0 * np.abs(s.imag) * beyond
         edge = (s.real >= 0) & (size * r >= 1.5 * np.abs(s))
         both = np.maximum(-m, np.where(ahead >= 0, ahead, -np.inf)) - 3 / 4 * total(d**2)
-        both = np.where(edge, np.maximum(both, 3 / 4 * across - m), both)
+        both = np.where(edge, np.maximum(both, 3 / 4 * across - np.maximum(m, 0.0)), both)
         kappa = square / 4 + both - (third + rest) / r
         # Where kappa > square / 64, kappa / 2 is far larger than its rounding error.
         return np.asarray(np.where(kappa > square / 64, kappa / 2 / self.extent**2, 0.0))
