@@ -482,7 +482,7 @@ def closest_changes(contact: Contact) -> Array:
 
 def turned(A: Influence, moved: Array, loads: Array) -> Array:
     """(n,) change of A P, P = `loads`, if the points of A move by `moved` (n, 2)."""
-    gained = (moved * A.slopes(loads)).sum(axis=1)
+    gained = (moved * A.slopes(loads).value).sum(axis=1)
     for k in (0, 1):
-        gained -= A.slopes(moved[:, k] * loads)[:, k]
+        gained -= A.slopes(moved[:, k] * loads).value[:, k]
     return np.asarray(gained)

@@ -214,14 +214,14 @@ class Geometry:
         """(m, 2) for each vector P, the sums  -scale sum_j (c_i - c_j) P_j / |c_i - c_j|^3.
 
         scale is 1 / (pi E*) in scaled units. The P are loads (m,) of the asperities `which`. For
-        more than IN_BALLS asperities the sums are computed in float64.
+        more than IN_BALLS asperities the compliance operator computes them.
         """
         if len(which) <= IN_BALLS:
             return self._in_balls(loads, which)
         A, found = self.problem.influence.restricted(which), []
         for P in loads:
-            errors = A.slope_errors(P.value) + A.falloff(P.error, 2) * A.scale
-            found.append(Ball.around(A.slopes(P.value), errors[:, None] * (1 + SAFETY)))
+            slopes, errors = A.slopes(P.value), A.falloff(P.error, 2) * A.scale
+            found.append(Ball.around(slopes.mid, slopes.radius + errors[:, None] * (1 + SAFETY)))
         return found
 
     def _in_balls(self, loads: Sequence[Ball], which: Indices) -> list[Ball]:

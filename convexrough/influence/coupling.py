@@ -131,10 +131,10 @@ class Influence(Coupling):
         """The map from loads to displacements at other points; a load at such a point adds 0."""
         return DirectCoupling(self.points, points, self.scale, self.point_error)
 
-    def slopes(self, loads: Array) -> Array:
+    def slopes(self, loads: Array) -> Ball:
         """(n, 2) derivatives of (A P)_i with respect to the contact point c_i of asperity i.
 
-        They are -scale sum_j (c_i - c_j) P_j / r_ij^3; `slope_errors` bounds their errors.
+        They are -scale sum_j (c_i - c_j) P_j / r_ij^3. Errors that are not known are infinite.
         """
         points, total = self.points, np.empty((len(self), 2))
         for some in _rows(len(self), len(self)):
@@ -142,12 +142,9 @@ class Influence(Coupling):
             for k in (0, 1):
                 apart = np.subtract.outer(points[some, k], points[:, k])
                 total[some, k] = (weights * apart).sum(axis=1)
-        return -self.scale * total
-
-    def slope_errors(self, loads: Array) -> Any:
-        """(n,) bounds on the errors of `slopes`, or one bound for all; infinite if not known."""
         off = (len(self) + 16) * ROUNDOFF + 4.0 * self.entry_error
-        return self.falloff(np.abs(loads) * off, 2) * self.scale
+        errors = self.falloff(np.abs(loads) * off, 2) * self.scale
+        return Ball.around(-self.scale * total, errors[:, None])
 
     def separations(self) -> Array:
         """(n,) [length] lower bounds on the distances of asperities to their nearest neighbours."""

@@ -21,12 +21,12 @@ from numpy.typing import NDArray
 
 from convexrough import threads
 from convexrough.arithmetic.balls import Ball
-from convexrough.arithmetic.pairs import Pair, in_parts, two_product, two_sum
+from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair, in_parts, two_product, two_sum
 from convexrough.arrays import Array, Indices, even
 from convexrough.influence import coupling
 from convexrough.influence.convolution import Kernel, SiteBox, through_waves
 from convexrough.influence.lattice_symbol import least_symbol
-from convexrough.influence.sliced import LARGE, MANY, SLICES, Distances, Sliced
+from convexrough.influence.sliced import LARGE, MANY, PULLED, SLICES, Distances, Pulls, Sliced
 from convexrough.influence.smoother import block_smoother
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.lattice import Lattice
@@ -133,6 +133,8 @@ class LatticeInfluence(coupling.Influence):
 
     def falloff(self, strengths: Array, power: int) -> Array:
         (box, places), largest = self._boxed, float(strengths.max(initial=0.0)) or 1.0
+        if largest == np.inf:
+            return np.full(len(strengths), np.inf)
         kernel = box.kernel(power, np.float32)
         shares = (strengths / largest).astype(np.float32)
         total = box.convolve_at(places, shares, kernel.spectrum).astype(np.float64)
@@ -207,20 +209,16 @@ class LatticeInfluence(coupling.Influence):
         joint = replace(self, array=together, members=np.arange(len(together)), layout=layout)
         return coupling.JointCoupling(joint, len(points))
 
-    def slopes(self, loads: Array) -> Array:
+    def slopes(self, loads: Array) -> Ball:
         box, places = self._boxed_for(loads)
-        each = [box.convolve_at(places, loads, 1j * pull.spectrum) for pull in self._pulls(box)]
-        return -self.scale / self.lattice.spacing**2 * np.stack(each, axis=1)
-
-    def slope_errors(self, loads: Array) -> float:
-        box, _ = self._boxed_for(loads)
-        norm = max(pull.norm for pull in self._pulls(box))
-        error = box.bound(norm, operations=16) * float(np.linalg.norm(loads))
+        slices = self._on(box, "sliced pulls", lambda: self._slice_pulls(box))
+        pulls = [pull.sums(Pair.exact(loads), places) for pull in slices]
         # The vector d / |d|^3 changes by at most 2 / |d|^3 times a small change of d.
         _, _, most, unknown = self._deviations
-        moved = 4.0 * (most + unknown) / self._least**3 * self._kernel.norm**2
-        error += moved * float(np.abs(loads).max(initial=0.0))
-        return 1.01 * error * self.scale / self.lattice.spacing**2
+        moved = 4.04 * (most + unknown) * self.lattice.spacing * self.falloff(np.abs(loads), 3)
+        values = np.stack([pull.value for pull in pulls], axis=1)
+        errors = np.stack([pull.error + moved for pull in pulls], axis=1)
+        return Ball.around(-self.scale * values, self.scale * (errors + 8 * ROUNDOFF * abs(values)))
 
     def _pulls(self, box: SiteBox) -> list[Kernel]:
         return self._on(box, "pulls", lambda: box.pulls(coupling.cubed))
@@ -274,9 +272,9 @@ class LatticeInfluence(coupling.Influence):
     def sums(self, loads: Pair, slices: int | None = None) -> Ball:
         """(n,) sums over j of P_j / r_ij, from slices (docs/theory/operators-lattice.md, "Slices").
 
-        By default there are 3 slices, or 4 on more than `MANY` sites; friction needs as many.
+        The default is 3 slices, and more for many sites: as many as friction needs.
         """
-        slices = slices or SLICES + int(math.prod(self.box.shape) > MANY)
+        slices = slices or SLICES + sum(math.prod(self.box.shape) > many for many in MANY)
         box, places = self._boxed_for(np.asarray(loads.high))
         off_sites = self._off_sites(np.asarray(loads.high), box, places)
         sliced = self._on(box, slices, lambda: self._slice(box, slices))
@@ -299,11 +297,26 @@ class LatticeInfluence(coupling.Influence):
         return {}
 
     def _slice(self, box: SiteBox, count: int) -> Sliced:
-        unit = float(2.0 ** np.floor(np.log2(self.lattice.spacing)))
-        basis = [[x / Fraction(unit) for x in vector] for vector in self.lattice.exactly]
-        distances = Distances.of(basis, max(box.shape))
+        unit, basis = self._in_unit
         norm = self._kernel.norm * unit / self.lattice.spacing
-        return Sliced.of(box, distances, norm, unit, count)
+        return Sliced.of(box, Distances.of(basis, max(box.shape)), norm, unit, count)
+
+    def _slice_pulls(self, box: SiteBox) -> list[Sliced]:
+        """The kernels x / r^3 and y / r^3, in slices."""
+        unit, basis = self._in_unit
+        norm = self._kernel.norm * unit / self.lattice.spacing  # r >= 1, so 1 / r^2 <= 1 / r
+        found, known = [], Distances.of(basis, max(box.shape))
+        for one, two in zip(*basis, strict=True):
+            along = Pair.nearest(one), Pair.nearest(two)
+            pulls = Pulls(known.gram, 3.0 * known.error + 32 * PAIR_ROUNDOFF, along)
+            found.append(Sliced.of(box, pulls, norm, unit**2, PULLED))
+        return found
+
+    @property
+    def _in_unit(self) -> tuple[float, list[list[Fraction]]]:
+        """A power of two up to the spacing, and the basis in this unit."""
+        unit = float(2.0 ** np.floor(np.log2(self.lattice.spacing)))
+        return unit, [[x / Fraction(unit) for x in vector] for vector in self.lattice.exactly]
 
     @property
     def _deviations(self) -> tuple[Array, Array, float, float]:

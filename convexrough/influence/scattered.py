@@ -90,13 +90,10 @@ class ScatteredInfluence(coupling.Influence):
         together = np.concatenate((points, self.points))
         return coupling.JointCoupling(replace(self, points=together, tails=None), len(points))
 
-    def slopes(self, loads: Array) -> Array:
+    def slopes(self, loads: Array) -> Ball:
         if self._double is None:
             return super().slopes(loads)
-        return -self.scale * self._double.slopes(loads)
-
-    def slope_errors(self, loads: Array) -> Any:
-        return super().slope_errors(loads) if self._double is None else np.inf
+        return Ball.around(-self.scale * self._double.slopes(loads), np.inf)
 
     def sums(self, loads: Pair) -> Ball:
         found = self._sums(loads)

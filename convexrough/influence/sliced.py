@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +26,13 @@ from convexrough.roundoff import ROUNDOFF
 #: Largest error allowed in a computed level; below 1/2, rounding to whole numbers removes it.
 SURE = 0.45
 
-#: Number of slices. One more slice is used on boxes of more than LARGE sites in a press, and of
-#: more than MANY sites elsewhere. On 6.6 million sites, error bounds of loads are 7e-13 of the
-#: largest load with three slices, and 3e-15 with four.
-SLICES, LARGE, MANY = 3, 2**22, 2**16
+#: Number of slices. One more slice is used on boxes of more than LARGE sites in a press. Elsewhere
+#: one more is used for each of the numbers MANY that the sites exceed. On 6.6 million sites, error
+#: bounds of loads are 7e-13 of the largest load with three slices, and 3e-15 with four.
+SLICES, LARGE, MANY = 3, 2**22, (2**14, 2**17)
+
+#: Number of slices of the kernels in derivatives by positions.
+PULLED = 2
 
 #: Largest number of bits in a slice; with 53, float64 would have no bits left for a rest.
 MOST_BITS = 48
@@ -37,8 +40,9 @@ MOST_BITS = 48
 
 @dataclass(frozen=True)
 class Distances:
-    """1 / |i b1 + j b2| for integers i and j; 0 for i = j = 0."""
+    """The even kernel 1 / |i b1 + j b2| for integers i and j; 0 for i = j = 0."""
 
+    odd: ClassVar[bool] = False
     #: (3, 3) slices (rows) of b1 b1, 2 b1 b2 and b2 b2 (columns). The first two have so few bits
     #: that sums of their products with i^2, i j and j^2 are exact.
     gram: Array
@@ -76,6 +80,22 @@ class Distances:
         return Pair(*two_sum(high, low + parts[2])).inverse_root()
 
 
+@dataclass(frozen=True)
+class Pulls(Distances):
+    """The odd kernel x / r^3, r = |i b1 + j b2|, for one coordinate x of i b1 + j b2; 0 at r = 0.
+
+    The error of each value is at most `error` / r^2.
+    """
+
+    odd: ClassVar[bool] = True
+    along: tuple[Pair, Pair]  # this coordinate of b1 and b2
+
+    def at(self, i: Indices, j: Indices) -> Pair:
+        inverse, (one, two) = super().at(i, j), self.along
+        across = Pair.exact(i.astype(np.float64)[:, None]) * one
+        return (across + Pair.exact(j.astype(np.float64)) * two) * (inverse * inverse * inverse)
+
+
 def cut(values: Pair, bits: int, more: int, count: int) -> list[Array]:
     """`count` arrays v_1, v_2, ... with values = sum_s 2^-(bits + s more) v_{s+1}, s = 0, 1, ...
 
@@ -101,12 +121,15 @@ class Sliced:
     kernels: list[Kernel]  # the slices K_1, K_2, ...
     bits: int
     more: int  # the unit of K_{t+1} is 2^-(bits + t more)
-    error: float  # bound on the relative error of the values
+    lost: float  # bound on the 2-norm of all errors of the values, and of adding levels up
+    odd: bool  # True if the kernel is odd: its transform is i times the `spectrum` of the slices
     budget: float  # largest product of the 2-norms of a slice of loads and a slice of the kernel
 
     @classmethod
     def of(cls, box: SiteBox, values: Distances, norm: float, unit: float, count: int) -> Sliced:
-        """The kernel divided into `count` slices; `norm` is its approximate 2-norm."""
+        """The kernel divided into `count` slices; its 2-norm is at most 1.01 `norm`, and that of
+        the errors of its values at most `norm` times `values.error`.
+        """
         rows, columns = box.shape
         places = math.sqrt((2.0 * rows - 1.0) * (2.0 * columns - 1.0))
         sites = math.sqrt(float(rows * columns))
@@ -120,11 +143,12 @@ class Sliced:
             return cut(values.at(i, j), bits, more, count)
 
         while True:
-            kernels = box.kernels(slices, np.float64, count)
+            kernels = box.kernels(slices, np.float64, count, odd=values.odd)
             largest = max(each.norm for each in kernels[:-1])
             # For any loads, slices after the first are at most 2^(more - 1).
             if count == 2 or largest * 2.0 ** (more - 1) * sites <= budget:
-                return cls(box, unit, kernels, bits, more, values.error, budget)
+                lost = 1.01 * (values.error + 1.01 * count * PAIR_ROUNDOFF) * norm
+                return cls(box, unit, kernels, bits, more, lost, values.odd, budget)
             more -= 1
 
     def sums(self, loads: Pair, at: Indices) -> Ball:
@@ -157,10 +181,8 @@ class Sliced:
             behind = behind * 2.0**-self.more + norm
             left += kernel.norm * behind
         # Cauchy's inequality bounds the effect of errors of values and of operations on pairs.
-        norms = (k.norm * 2.0 ** -(t * self.more) for t, k in enumerate(self.kernels))
-        whole = 1.01 * 2.0**-self.bits * sum(norms) * float(np.linalg.norm(shares.high))
         radius = self.box.bound(left, operations=_operations(count)) * units[-1]
-        radius += (self.error + count * PAIR_ROUNDOFF) * whole
+        radius += self.lost * 1.01 * float(np.linalg.norm(shares.high))
         return Ball.around(in_parts(len(at), add_up), 1.01 * radius * unit + TINY)
 
     def _cut(self, shares: Pair) -> tuple[list[Array], int]:
@@ -176,7 +198,7 @@ class Sliced:
         """The transforms of the levels of whole numbers, and of the sum of all other products."""
         spectra = [kernel.spectrum[:, each] for kernel in self.kernels]
         last = len(waves) - 1
-        levels = []
+        levels: list[NDArray[Any]] = []
         for level in range(last):
             total = waves[0] * spectra[level]
             for s in range(1, level + 1):
@@ -188,7 +210,11 @@ class Sliced:
             behind *= 2.0**-self.more
             behind += waves[last - t]
             left += behind * spectra[t]
-        return [*levels, left]
+        levels.append(left)
+        if self.odd:
+            for product in levels:
+                product *= 1j
+        return levels
 
 
 def _operations(count: int) -> int:
