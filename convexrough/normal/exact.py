@@ -59,6 +59,12 @@ class Data(NamedTuple):
     offsets: Ball  # (n,) d
     scale: Ball  # () 1 / (pi E*)
 
+    def at(self, which: Indices) -> Data:
+        """The numbers of some asperities."""
+        even = self.coefficients.shape == (1,)
+        coefficients = self.coefficients if even else self.coefficients[which]
+        return Data(coefficients, self.offsets[which], self.scale)
+
 
 def exact_data(scene: Scene, which: Indices, units: Units, sizes: Array) -> Data:
     """The coefficients, offsets and scale of the asperities `which` of a scene.

@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from convexrough.arithmetic.balls import Ball, of_rows, where
 from convexrough.arithmetic.pairs import Pair
-from convexrough.arrays import Array, Indices, summed
+from convexrough.arrays import Array, Indices, among_zeros, summed
 from convexrough.convex.newton_step import correct
 from convexrough.convex.theorem import distance, excess
 from convexrough.errors import ProofError, SolverError
@@ -36,6 +36,10 @@ from convexrough.roundoff import SAFETY
 #: Largest accepted residual of `Level.response` after refinement, divided by the larger of the
 #: residual before refinement and the right side.
 SOLVED = 1e-6
+
+#: `Level.response` computes A x to thirty digits once the rounding error of the residual exceeds
+#: this part of the residual; before that, float64 is enough. Affects speed only.
+ROUGH = 1e-3
 
 
 class Response(NamedTuple):
@@ -56,6 +60,12 @@ class Springs(NamedTuple):
     compliance: Ball  # 1/c, 0 where not touching
     bound: Array  # h, a lower bound on 1/c where the asperity may touch; infinite where open
     margin: float  # mu of docs/theory/one-theorem.md, with H = diag(h); 0 if nothing is proved
+
+    def at(self, which: Indices) -> Springs:
+        """The springs of some asperities."""
+        touching, doubtful, slopes, compliance, h, margin = self
+        some = touching[which], doubtful[which], slopes[which], compliance[which], h[which]
+        return Springs(*some, margin)
 
 
 class Obstacle(NamedTuple):
@@ -207,7 +217,12 @@ class Level:
 
         Raises SolverError if the system is singular or nearly singular.
         """
-        problem, springs = self.problem, self.springs
+        problem, springs, n = self.problem, self.springs, len(self.problem)
+        some = np.arange(n)
+        if problem.influence.cheap_sums:  # leave out asperities that are open
+            some = np.flatnonzero(springs.touching | springs.doubtful)
+            problem, right = problem.restricted(some), right[some]
+            springs = springs.at(some)
         c, weights = springs.slopes, springs.slopes / springs.slopes.sum()
         j = int(np.argmax(c))
 
@@ -216,9 +231,9 @@ class Level:
             high[j], low[j] = x.at(j) + (total.mid - x.total())
             return Pair(high, low)
 
-        def residual(x: Pair) -> tuple[Ball, Ball]:
+        def residual(x: Pair, product: Ball) -> tuple[Ball, Ball]:
             """x / c + A x - right - beta, and beta, which makes the mean weighted by c about 0."""
-            above = springs.compliance * x + problem.product(x) - right
+            above = springs.compliance * x + product - right
             mean = float(weights @ above.value)
             beta = Ball.exact(mean) + float(weights @ (above - mean).value)
             return above - beta, beta
@@ -226,12 +241,18 @@ class Level:
         def weighted(values: Array) -> float:
             return float(np.sqrt(c @ values**2))
 
+        nothing, sharp, halved = Pair.exact(np.zeros(len(c))), False, True
         x = completed(Pair.exact(float(total.value) * weights))
-        left, beta = residual(x)
+        product = problem.moved(nothing, Ball.exact(nothing), x)
+        left, beta = residual(x, product)
         size, rounding = weighted(left.value), weighted(left.radius)
         accepted = SOLVED * max(size, weighted(right.value))
         for _ in range(CORRECTIONS):
-            if size == 0.0 or size <= rounding < np.inf:
+            if not sharp and (rounding > ROUGH * size or not halved):
+                product, sharp, halved = problem.product(x), True, True
+                left, beta = residual(x, product)
+                size, rounding = weighted(left.value), weighted(left.radius)
+            if size == 0.0 or not halved or size <= rounding < np.inf:
                 break
             defect = np.where(springs.touching, left.value, 0.0)
             unit = float(np.abs(defect).max())
@@ -239,56 +260,24 @@ class Level:
             system = problem.influence, problem.shells, np.sqrt(c)
             step = correct(*system, defect / unit, balanced=True, tolerance=least)
             following = completed(x + Pair.exact(c * step * unit))
-            better, risen = residual(following)
-            before, now = size, weighted(better.value)
+            moved = problem.moved(x, product, following)
+            better, risen = residual(following, moved)
+            now = weighted(better.value)
+            halved = now < 0.5 * size
             if now < size:
-                x, left, beta, size = following, better, risen, now
+                x, product, left, beta, size = following, moved, better, risen, now
                 rounding = weighted(left.radius)
-            if not now < 0.5 * before:
-                break
         if size > accepted and not size <= rounding < np.inf:
             raise SolverError(
                 "the state has no derivative: its linear system is singular or nearly singular",
                 solver="response",
                 advice="the energy may not be convex at this load: press with a smaller load",
             )
-        if not springs.margin > 0.0:
-            return Response(Ball.around(x, np.inf), Ball.around(beta.mid, np.inf))
-        return Response(*self._bounded(x, left, beta, total, j))
-
-    def _bounded(self, x: Pair, left: Ball, beta: Ball, total: Ball, j: int) -> tuple[Ball, Ball]:
-        """Balls of the solution near x and `beta`, whose residual is `left`.
-
-        A change of x_j makes the total right. Let s bound this change: what the total misses, and
-        the sum of |x| of asperities neither proved to touch nor to be open.
-        """
-        problem, short = self.problem, float((total - Ball.exact(x).sum()).size)
-        touching, doubtful, _, compliance, h, margin = self.springs
-
-        def residual(others: float) -> tuple[Array, float, float]:
-            """Bounds on the residual after the change, on s, and on the displacements by it and by
-            asperities without a proved status, whose |x| have the sum `others`.
-            """
-            s = short + others
-            moved = (s + others) * problem.largest_entry
-            e = left.size + moved
-            e[j] += s * float(compliance.upper[j])
-            return e, s, moved
-
-        carried = np.zeros(len(h))
-        if doubtful.any():
-            e, _, _ = residual(0.0)
-            within = distance(np.where(np.isinf(h), 0.0, e), h, margin)
-            carried[doubtful] = (within / np.sqrt(h[doubtful])) * (1 + SAFETY)
-        e, s, moved = residual(float(carried.sum()) * (1 + SAFETY))
-        known = np.where(touching, h, np.inf)
-        within = distance(np.where(touching, e, 0.0), known, margin)
-        errors = np.where(touching, within / np.sqrt(known) * (1 + SAFETY), carried)
-        errors[j] += s
-        moved += within / np.sqrt(float(known.min())) * problem.row_norm
-        each = (left.size + compliance.upper * errors)[touching]
-        off = (float(each.min()) + moved) * (1 + SAFETY)
-        return Ball.around(x, errors), Ball.around(beta.mid, beta.radius + off)
+        found = Ball.around(x, np.inf), Ball.around(beta.mid, np.inf)
+        if springs.margin > 0.0:
+            found = _bounded(problem, springs, x, left, beta, total, j)
+        spread = partial(among_zeros, places=some, count=n)
+        return Response(of_rows(spread, found[0]), found[1])
 
     @cached_property
     def rates(self) -> Array:
@@ -296,6 +285,49 @@ class Level:
         q, rate = self.tangent
         rates: Array = float(rate.value) - self.problem.influence.apply(q.value)
         return rates
+
+
+def _bounded(
+    problem: NormalProblem,
+    springs: Springs,
+    x: Pair,
+    left: Ball,
+    beta: Ball,
+    total: Ball,
+    j: int,
+) -> tuple[Ball, Ball]:
+    """Balls of the solution near x and `beta`, whose residual is `left`.
+
+    A change of x_j makes the total right. Let s bound this change: what the total misses, and
+    the sum of |x| of asperities neither proved to touch nor to be open.
+    """
+    short = float((total - Ball.exact(x).sum()).size)
+    touching, doubtful, _, compliance, h, margin = springs
+
+    def residual(others: float) -> tuple[Array, float, float]:
+        """Bounds on the residual after the change, on s, and on the displacements by it and by
+        asperities without a proved status, whose |x| have the sum `others`.
+        """
+        s = short + others
+        moved = (s + others) * problem.largest_entry
+        e = left.size + moved
+        e[j] += s * float(compliance.upper[j])
+        return e, s, moved
+
+    carried = np.zeros(len(h))
+    if doubtful.any():
+        e, _, _ = residual(0.0)
+        within = distance(np.where(np.isinf(h), 0.0, e), h, margin)
+        carried[doubtful] = (within / np.sqrt(h[doubtful])) * (1 + SAFETY)
+    e, s, moved = residual(float(carried.sum()) * (1 + SAFETY))
+    known = np.where(touching, h, np.inf)
+    within = distance(np.where(touching, e, 0.0), known, margin)
+    errors = np.where(touching, within / np.sqrt(known) * (1 + SAFETY), carried)
+    errors[j] += s
+    moved += within / np.sqrt(float(known.min())) * problem.row_norm
+    each = (left.size + compliance.upper * errors)[touching]
+    off = (float(each.min()) + moved) * (1 + SAFETY)
+    return Ball.around(x, errors), Ball.around(beta.mid, beta.radius + off)
 
 
 class Rows(NamedTuple):

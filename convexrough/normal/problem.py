@@ -243,7 +243,7 @@ class NormalProblem:
 
     def restricted(self, which: Indices) -> NormalProblem:
         """The problem in which only the candidates with these indices may carry loads."""
-        return replace(
+        part = replace(
             self,
             candidates=self.candidates[which],
             coefficients=taken(self.coefficients, which),
@@ -252,6 +252,9 @@ class NormalProblem:
             influence=self.influence.restricted(which),
             shells=taken(self.shells, which),
         )
+        if "exact" in self.__dict__:
+            part.__dict__["exact"] = self.exact.at(which)
+        return part
 
     def widened(self, which: Indices) -> NormalProblem:
         """The same problem with a larger set of candidates: the asperities `which` of the scene."""
