@@ -7,11 +7,10 @@ the support. The shells have the radii R_k = c~_k / (pi E*).
 
 The weights are those for which some moments vanish and which, together with a charge -1 at i, have
 the least electrostatic energy. The moments are sums of w_k times functions of z_k, the vector from
-i to k as a complex number, divided by the outward direction: from the middle of the support to i
-or, in a second try, from the mean of the neighbours to i. Where such weights fail, a linear program
-finds those with the least q_i, for few asperities. For an asperity i outside the contact one
-neighbour alone suffices if the whole support is nearer to this neighbour than to i, and the
-neighbour's shell does not reach i.
+i to k as a complex number, divided by the direction from the middle of the support to i. Where such
+weights fail, a linear program finds those with the least q_i, for few asperities. For an asperity i
+outside the contact one neighbour alone suffices if the whole support is nearer to this neighbour
+than to i, and the neighbour's shell does not reach i.
 """
 
 from __future__ import annotations
@@ -54,14 +53,11 @@ def corner(d: NDArray[np.complex128]) -> list[Array]:
 #: weights by the linear program.
 EQUAL, LIGHTEST = "equal", "lightest"
 
-#: Numbers of neighbours, moments of the weights or one of these names, and whether the mean of the
-#: neighbours decides what is outward. They are tried until the bound 1 - q_i suffices. A try also
-#: uses the asperities that determined q_i in earlier tries.
-TRIES: tuple[tuple[int, Moments | str, bool], ...] = (
-    (6, EQUAL, False), (4, EQUAL, False),
-    (12, around, False), (10, edge, False), (10, edge, True), (14, corner, False),
-    (32, around, False), (32, edge, False), (32, edge, True),
-    (60, around, False), (60, edge, False), (60, edge, True), *3 * ((60, LIGHTEST, False),),
+#: Numbers of neighbours, and moments of the weights or one of these names. They are tried until the
+#: bound 1 - q_i suffices. A try also uses the asperities that determined q_i in earlier tries.
+TRIES: tuple[tuple[int, Moments | str], ...] = (
+    (6, EQUAL), (4, EQUAL), (12, around), (10, edge), (18, around), (14, corner), (18, edge),
+    (32, around), (32, edge), (60, around), (60, edge), *3 * ((60, LIGHTEST),),
 )  # fmt: skip
 
 MORE, FEW = 32, 300  # more than MORE neighbours are tried only if at most FEW asperities remain
@@ -188,7 +184,7 @@ class _Swept:
     def improve(self, rates: Array, which: Indices, least: Array) -> None:
         """Increase the bounds `rates` (n,) of asperities, try by try, until they exceed `least`."""
         worst = near = np.empty((len(which), 0), dtype=np.intp)
-        for count, moments, by_near in TRIES:
+        for count, moments in TRIES:
             if len(which) == 0 or (count > MORE and len(which) > FEW):
                 break
             width = count + worst.shape[1]
@@ -199,7 +195,7 @@ class _Swept:
             if moments == EQUAL:
                 weights = self.equal(which, charged)
             elif callable(moments):
-                make = partial(self.weights, moments, by_near)
+                make = partial(self.weights, moments)
                 weights = _in_parts(make, (width + 5) ** 2, which, charged)
             else:
                 weights = self.lightest(which, charged)
@@ -211,11 +207,10 @@ class _Swept:
                 worst = np.column_stack((worst, failed))
             which, worst, near = which[todo], worst[todo], near[todo]
 
-    def weights(self, moments: Moments, by_near: bool, which: Indices, near: Indices) -> Array:
+    def weights(self, moments: Moments, which: Indices, near: Indices) -> Array:
         """(m, s) weights of least energy of the neighbours `near`; 0 where none are found."""
         (m, s), here = near.shape, self.places[which]
-        middle = self.places[near].mean(axis=1) if by_near else self.middle
-        outwards = np.where(here == middle, 1.0, here - middle)
+        outwards = np.where(here == self.middle, 1.0, here - self.middle)
         away = (self.places[near] - here[:, None]) / (outwards / np.abs(outwards))[:, None]
         least = np.abs(away).min(axis=1)[:, None]
         sums = np.stack([np.ones((m, s)), *moments(away / least)], axis=1)

@@ -116,9 +116,8 @@ def test_far_potentials_exceed_their_bound(seed: int) -> None:
     swept = sweeping._Swept(influence, everyone, 0.3 * random.random(n))
     near, found = swept.neighbours(everyone, 10), 0
     order = swept.neighbours(everyone, n - 1)
-    tries = (sweeping.around, False), (sweeping.edge, False), (sweeping.edge, True)
-    for moments, by_near in (*tries, (sweeping.corner, False)):
-        weights = swept.weights(moments, by_near, everyone, near)
+    for moments in (sweeping.around, sweeping.edge, sweeping.corner):
+        weights = swept.weights(moments, everyone, near)
         weights *= random.uniform(0.9, 1.0, weights.shape) ** random.choice([0, 1, 10])
         weights /= np.maximum(weights.sum(axis=1, keepdims=True), 1e-300)
         gains = swept.gains(everyone, near, weights, order[:, far])
