@@ -145,6 +145,17 @@ def test_other_solutions_are_as_the_certificate_says(distance: float) -> None:
     assert judged_any or distance == 4e-4  # crowding just above pi: only both touching is found
 
 
+@pytest.mark.parametrize("load", [0.0, 1e-12])
+def test_loads_at_the_bounds_of_their_ranges_prove_nothing(load: float) -> None:
+    """Small loads lie in a box where the energy is convex, but least where loads are at bounds."""
+    scene, approach = on_sphere([[0, 0], [5.7e-4, 0]], heights=[-1.5e-5, 0.0]), 5e-5
+    (only,) = all_states(scene, approach)
+    assert only[0] == 0 < only[1]
+    given = np.full(2, load)
+    exact = solve_exactly(scene, approach=approach, start=only)
+    assert_honest(cr.certify(scene, given, approach=approach), given, exact)
+
+
 def scaled(lengths: Array, points: Array) -> Array:
     """I + H^-1/2 A H^-1/2."""
     root = np.sqrt(lengths)

@@ -143,16 +143,6 @@ def test_the_bound_is_above_the_approach(rough: dict[str, Any], load: float) -> 
     assert cr.press(scene, load=load).certificate.approach <= bound * (1 + 1e-12)
 
 
-def test_no_proof_where_loads_lie_beyond_a_face_of_the_box() -> None:
-    problem = assembled(paper(), load=3.6e-7)
-    state = refined_loads(problem, Newton().solve(problem).loads)
-    box = tried(problem, state.loads.high, state.product)
-    assert box is not None
-    assert proved(problem, state, box).box is box
-    lower = box._replace(faces=0.9 * state.loads.high)
-    assert proved(problem, state, lower).box is None
-
-
 def test_bounds_cover_all_loads_within_an_uncertain_total() -> None:
     pair = cr.Asperities([[-1e-3, 0.0], [1e-3, 0.0]], 0.02)  # alike: the loads only scale
     problem = assembled(cr.Scene(1.0, pair, MATERIAL), load=1e-8)
