@@ -1,6 +1,12 @@
 """What every compliance operator promises, against sums over all pairs in 160 bits."""
 
+import itertools
+import sys
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
+from types import FrameType
 from typing import Any
 
 import multiprecision
@@ -16,8 +22,10 @@ from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair, two_product
 from convexrough.bench.scenes import APPROACH
 from convexrough.bench.scenes import scene as bench_scene
+from convexrough.influence import lattice
 from convexrough.influence.coupling import Coupling, Influence, JointCoupling, inverse_distances
 from convexrough.influence.dense import DenseInfluence
+from convexrough.influence.lattice import LatticeInfluence
 from convexrough.influence.scattered import ScatteredInfluence
 from convexrough.influence.shells import fitted_shells, shells
 from convexrough.normal.certificate import certify_on
@@ -130,6 +138,52 @@ def test_parts_and_other_points(kind: str, layout: str, seed: int, count: int) -
         for power in (2, 3):
             exactly, _ = inverse_sums(points, part.points, loads, power=power)
             assert (coupling.falloff(loads, power) >= exactly).all()
+
+
+def at_line(k: int, call: Callable[[], Any], other: Callable[[], Any]) -> tuple[Any, bool]:
+    """What `call` returns if another thread calls `other` before its kth line in the module of
+    lattices, and whether there are so many lines.
+    """
+    lines, before = itertools.count(), sys.gettrace()
+
+    def trace(frame: FrameType, event: str, _: Any) -> Any:
+        if frame.f_code.co_filename != lattice.__file__:
+            return None
+        if next(lines) == k:
+            thread.submit(other).result()
+        return trace
+
+    with ThreadPoolExecutor(1) as thread:
+        sys.settrace(trace)
+        try:
+            return call(), next(lines) > k
+        finally:
+            sys.settrace(before)
+
+
+def interrupted(points: Array, ask: Any, own: Any, other: Any, first: Any) -> Iterator[Any]:
+    """What `ask` returns for `own` if another thread asks for `other` at any moment."""
+    for k in itertools.count():
+        A = on_lattice(points, SCALE)
+        ask(A, first)
+        found, reached = at_line(k, partial(ask, A, own), partial(ask, A, other))
+        yield found
+        if not reached:
+            return
+
+
+def test_threads_that_restrict_one_operator_at_once_get_their_own() -> None:
+    points, own, other = lattice_patch(np.eye(2), 60), np.arange(40), np.arange(20, 60)
+    for part in interrupted(points, LatticeInfluence.restricted, own, other, first=other):
+        assert (part.points == points[own]).all()
+
+
+def test_threads_whose_loads_reach_unequally_far_get_their_own_sums() -> None:
+    points = lattice_patch(turned(BASES["square"], 0.3), 60)
+    near, everywhere = Pair.exact(np.eye(60)[0]), Pair.exact(np.ones(60))
+    true = on_lattice(points, SCALE).sums(near)
+    for found in interrupted(points, LatticeInfluence.sums, near, everywhere, first=near):
+        assert (np.abs((found - true).value) <= found.radius + true.radius).all()
 
 
 @pytest.mark.sample(4)
