@@ -7,8 +7,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from flint import arb, ctx
+from friction_scenes import SCENES
 from gradient_oracle import DIGITS, STEP, Setup, exact
-from levels_reference import SCENES, Bristles, cycle_loss, of_setup
+from levels_reference import Bristles, cycle_loss, of_setup
 from path_scenes import LARGEST, PAPER, around, on_flat, shaded
 from scenes import MATERIAL, on_sphere
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from levels_reference import SCENES
+from friction_scenes import SCENES
 from path_scenes import around, on_flat, shaded
 
 import convexrough as cr

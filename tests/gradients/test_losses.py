@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 from flint import arb, ctx
-from friction_scenes import FRICTION, with_friction
+from friction_scenes import FRICTION, SCENES, pressed, with_friction
 from gradient_oracle import DIGITS, STEP, Setup, assert_close, exact, known
-from levels_reference import SCENES, Holding, of_setup, pressed
+from levels_reference import of_setup
 from scenes import hexagonal, paper
 
 import convexrough as cr
@@ -24,7 +24,7 @@ NAMES = ("heights", "tip_radii", "positions", "sphere_radius", "contact_modulus"
 
 
 def assert_both(
-    contact: cr.Contact, force: float, holding: Holding, sharp: float, seed: int = 0
+    contact: cr.Contact, force: float, holding: Any, sharp: float, seed: int = 0
 ) -> None:
     """Values and derivatives, of arrays along random signs and by two entries, and their bounds."""
     loss = cr.cycle(contact, maximum=force).gradient(holding=holding)
@@ -58,15 +58,15 @@ def assert_both(
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("fraction", [1e-2, 0.4, 0.999])
 @pytest.mark.parametrize("holding", ["load", "approach"])
-def test_every_derivative(name: str, fraction: float, holding: Holding) -> None:
-    contact = pressed(name, holding)
+def test_every_derivative(name: str, fraction: float, holding: str) -> None:
+    contact = pressed(name, control=holding)
     assert_both(contact, fraction * FRICTION * contact.load, holding, SHARP)
 
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("fraction", [1e-9, 1e-6, 1e-4, 1 - 1e-7])
 def test_bounds_are_honest_where_they_are_not_sharp(fraction: float) -> None:
-    contact = pressed("rough", "load")
+    contact = pressed("rough", control="load")
     assert_both(contact, fraction * FRICTION * contact.load, "load", 0.0)
 
 
@@ -95,7 +95,7 @@ def test_no_bound_is_too_small(seed: int) -> None:
     contact = cr.press(scene, approach=approach)
     if contact.certificate.scope == "none":
         return
-    holding: Holding = "approach"
+    holding = "approach"
     if rng.uniform() < 0.5:
         contact, holding = cr.press(scene, load=contact.load), "load"
     fraction = float(rng.choice([1e-3, 0.1, 0.9, rng.uniform()]))
@@ -104,7 +104,7 @@ def test_no_bound_is_too_small(seed: int) -> None:
 
 
 def test_gross_sliding_from_one_side() -> None:
-    contact = pressed("rough", "load")
+    contact = pressed("rough", control="load")
     force = FRICTION * contact.load
     gradient = cr.cycle(contact, maximum=force).gradient()
     assert (gradient.maximum, gradient.load, gradient.friction) == (np.inf, -np.inf, -np.inf)
@@ -142,7 +142,7 @@ def test_many_asperities_by_every_operator() -> None:
 @pytest.mark.parametrize("name", ["rough", "rough, closest"])
 def test_normalised(name: str, holding: Any) -> None:
     """Against differences of W / W0 in float64, by everything at once."""
-    contact = pressed(name, holding)
+    contact = pressed(name, control=holding)
     force = 0.3 * contact.load
     gradient = cr.cycle(contact, maximum=force).gradient().normalised
     scene, rng = contact.scene, np.random.default_rng(2)

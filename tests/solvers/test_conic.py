@@ -10,14 +10,7 @@ from scenes import NAMED, PAPER_APPROACH, hexagonal, paper, prescribed
 
 import convexrough as cr
 from convexrough.normal.problem import NormalProblem
-from convexrough.solvers import (
-    BristleQP,
-    Conic,
-    ConicCVXPY,
-    Newton,
-    Solution,
-    TooDenseError,
-)
+from convexrough.solvers import BristleQP, Conic, ConicCVXPY, Newton, Solution, TooDenseError
 from convexrough.solvers.conic import ConeBoxes, LiftedProgram, solve_in
 from convexrough.solvers.programs import ProgramAnswer
 

@@ -106,7 +106,7 @@ def test_bounds_are_sharp_up_to_where_all_slide(name: str, nu: float) -> None:
 def test_doubt_about_the_loads_is_counted(fraction: float, digits: int) -> None:
     """Friction starts from balls that hold the true loads, however the loads were rounded."""
     contact = pressed("paper")
-    doubtful = in_doubt(contact, digits, "approach")
+    doubtful = in_doubt(contact, digits)
     force = fraction * FRICTION * contact.load
     truth, state = shear_vector(contact, force=force), shear_vector(doubtful, force=force)
     known = state.certificate
