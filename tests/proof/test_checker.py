@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 import scenes
 from flint import arb, ctx, fmpq
-from path_scenes import shaded
+from path_scenes import ring, shaded
 
 import convexrough as cr
 from convexrough import checker
@@ -231,10 +231,10 @@ def test_what_is_damaged_is_named(few: Any, place: str) -> None:
 
 def test_an_asperity_that_is_dragged_along_is_refused() -> None:
     """One between six blunt ones loses load as the total rises, so regains some in shear."""
-    six = [[np.cos(t), np.sin(t)] for t in np.arange(6) * np.pi / 3]
-    points = 0.0025 * np.array([[0, 0], *six])
-    ring = scenes.on_sphere(points, [0.02, *[0.1] * 6], [-1e-5, *[0.0] * 6], friction=0.5)
-    contact = cr.press(ring, approach=7.6e-5)
+    tips, heights = [0.02, *[0.1] * 6], [-1e-5, *[0.0] * 6]
+    contact = cr.press(
+        scenes.on_sphere(0.0025 * ring(6), tips, heights, friction=0.5), approach=7.6e-5
+    )
     assert contact.proof().document["claims"]["scope"] == "global"
     left = cr.press(contact.scene, load=0.99 * contact.load)
     assert left.loads[0] > contact.loads[0]
