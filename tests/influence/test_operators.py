@@ -45,9 +45,8 @@ EVEN = ("disc", "jittered")
 
 def operator(kind: str, layout: str, rng: np.random.Generator, count: int = 0) -> Any:
     if kind == "lattice":
-        points = lattice_patch(
-            turned(BASES[layout], 0.3), count or int(rng.choice([40, 500, 1000]))
-        )
+        count = count or int(rng.choice([40, 500, 1000]))
+        points = lattice_patch(turned(BASES[layout], 0.3), count)
         return on_lattice(points + rng.choice([0.0, 300.0, 1e6]), SCALE)
     points = LAYOUTS[layout](rng)
     if kind == "dense":  # more than 64 points are summed in blocks
@@ -80,9 +79,8 @@ def test_products_and_sums(kind: str, layout: str, seed: int) -> None:
     rows, loads = rng.integers(0, len(A), 30), loadings(len(A), rng)
     shift = np.abs(A.points.mean(axis=0)).max() if kind == "lattice" else 0.0
     good = {"dense": 1e-14, "lattice": max(1e-14, 3e-16 * shift), "scattered": 1e-13}[kind]
-    for load, true, rest in zip(
-        loads, *(x.T for x in inverse_sums(A.points[rows], A.points, loads.T, SCALE)), strict=True
-    ):
+    sums = (each.T for each in inverse_sums(A.points[rows], A.points, loads.T, SCALE))
+    for load, true, rest in zip(loads, *sums, strict=True):
         product, sizes, rounding = A.apply(load), A.apply(np.abs(load)), A.rounding(load)
         error, top = np.abs(product[rows] - true - rest), float(sizes.max())
         assert error.max() <= good * top

@@ -123,7 +123,9 @@ def test_values_at_points(order: int) -> None:
     for k in range(0, 200, 20):
         true = Fraction(0)
         stencil = range(1 - order // 2, order // 2 + 1)
-        factors = ([weight(place, n, order) for n in stencil] for place in placed.shares[k].tolist())
+        factors = (
+            [weight(place, n, order) for n in stencil] for place in placed.shares[k].tolist()
+        )
         i, j = placed.cells[k].tolist()
         for (m, x), (n, y) in product_of(*map(enumerate, factors)):
             true += x * y * (Fraction(whole[i + m, j + n]) + Fraction(rest[i + m, j + n]))
