@@ -199,17 +199,13 @@ def _audit_shear(
         forces = exact.forces if exact else [FRICTION * p for p in full.loads]
     state, cycle = cr.shear(contact, force=force), cr.cycle(contact, maximum=force)
     vector = cr.shear_vector(_with_poisson(contact, 0.0), force=force)
-    for stage, statuses in (
-        ("shear", state.status),
-        ("cycle", cycle.status),
-        ("vector", vector.status),
-    ):
-        for i, (status, load) in enumerate(zip(statuses, full.loads, strict=True)):
+    for stage, found in (("shear", state), ("cycle", cycle), ("vector", vector)):
+        for i, (status, load) in enumerate(zip(found.status, full.loads, strict=True)):
             slides = exact is None or exact.slips[i] > 0
             require(status != "sliding" or (load > 0 and slides), f"{stage}: sliding of {i}")
             require(status != "partial" or (load > 0 and not slides), f"{stage}: partial of {i}")
             require(status != "open" or not load > 0, f"{stage}: open of {i}")
-        tally.count(kind if fraction < 1 else "limit", operator, stage, statuses)
+        tally.count(kind if fraction < 1 else "limit", operator, stage, found.status)
     proof = state.certificate
     tally.compare(operator, "force", proof.force_errors, state.forces, forces)
     errors = vector.certificate.force_errors
@@ -235,18 +231,13 @@ def _audit_history(
         except Dragged:
             return
         assert inner is not None  # below the force that is
-        rises = [
-            there.displacement,
-            there.displacement - 2 * inner.displacement,
-            there.displacement,
-            -there.displacement,
-        ]
+        far = there.displacement
+        rises = [far, far - 2 * inner.displacement, far, -far]
         once, back = there.energy / 4, inner.energy / 2
         losses = [once, once + back, once + 2 * back, once + 2 * back + there.energy / 2]
         forces = there.forces - 2 * inner.forces
-    tally.compare(
-        operator, "past displacement", past.displacement_errors, past.displacements, rises
-    )
+    errors = past.displacement_errors
+    tally.compare(operator, "past displacement", errors, past.displacements, rises)
     tally.compare(operator, "past loss", past.loss_errors, past.losses, losses)
     one, other = (cr.shear(contact, force=Q).certificate for Q in (force, 0.625 * force))
     errors = one.force_errors + 2 * other.force_errors + 1e-14 * abs(force)
@@ -288,12 +279,8 @@ def audit_vectors(
         require(state.status[i] != ("partial" if slides else "sliding"), f"tensor: status of {i}")
     nu = arb(tilted.scene.material.poisson_ratio)
     with ctx.workdps(DIGITS + 30):
-        travel = travel_of(arb(FRICTION), nu)
-        forces, slips, displacement = (
-            FRICTION * true.forces,
-            travel * true.slips,
-            travel * true.displacement,
-        )
+        travel, forces = travel_of(arb(FRICTION), nu), FRICTION * true.forces
+        slips, displacement = travel * true.slips, travel * true.displacement
     proof = state.certificate
     errors = proof.force_errors[touching]
     tally.compare(operator, "tensor force", errors, state.forces[touching], forces)

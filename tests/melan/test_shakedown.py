@@ -13,7 +13,7 @@ from multiprecision import solve_linear
 from numpy.testing import assert_allclose
 from path_scenes import LARGEST, PAPER, SCENES, shaded
 from scenes import solve_exactly, twins
-from scipy.sparse import csc_matrix, vstack
+from scipy.sparse import csc_matrix
 from vector_oracle import tangential_kernel
 
 import convexrough as cr
@@ -150,19 +150,13 @@ class Stuck:
         self.slip = np.zeros(len(limits))
 
     def go(self, total: Array) -> None:
-        n, scale = len(self.P), np.abs(self.K).max()
-        balance = np.tile(np.eye(2), n)
-        rows = np.zeros((3 * n, 2 * n))
-        rows[3 * np.arange(n) + 1, 2 * np.arange(n)] = -1.0
-        rows[3 * np.arange(n) + 2, 2 * np.arange(n) + 1] = -1.0
-        constant = np.zeros(3 * n)
-        constant[::3] = self.P
-        unit = self.P.max()
+        n, scale, unit = len(self.P), np.abs(self.K).max(), self.P.max()
+        bounded = np.kron(np.eye(n), [[0.0, 0.0], [-1.0, 0.0], [0.0, -1.0]])
         program = ConeProgram(
             csc_matrix(np.triu(self.K) / scale),
             -self.K @ (self.q / unit) / scale,
-            csc_matrix(vstack([csc_matrix(balance), csc_matrix(rows)])),
-            np.append(total, constant) / unit,
+            csc_matrix(np.vstack((np.tile(np.eye(2), n), bounded))),
+            np.append(total, np.kron(self.P, [1.0, 0.0, 0.0])) / unit,
             2,
         )
         raw = run_clarabel(program, "stuck", 1e-11)
@@ -175,30 +169,20 @@ class Stuck:
 def test_cycles_below_and_above_melans_limit(kind: Any) -> None:
     """From a first loading that slides: slip dies out 1 % below, and goes on 1 % above."""
     contact = cr.press(PAPER, load=P)
-    problem = contact.cached(FrictionProblem)
-    n = len(problem)
-    mean = np.array([0.3, 0.1 if kind == "vector" else 0.0]) * P
-    swing = np.array([[1.0, 0.0], [-1.0, 0.0]]) * P
-    vector = kind == "vector"
-    forces, kernel = mean if vector else mean[0], np.kron(problem.influence.matrix, np.eye(2))
-    limit = cr.shakedown(
-        PAPER, load=P, force=0.5 * forces, force_amplitudes=swung(kind, 0.5 * P), kind=kind
-    )
-    kernel = problem.kernel if vector else kernel
-    K = kernel + np.diag(np.repeat(problem.compliance, 2))
-    unit = problem.units.force
-    slid = {}
-    for part in (0.99, 1.01):
-        state = Stuck(K, problem.loads)
-        slips = []
+    problem, vector = contact.cached(FrictionProblem), kind == "vector"
+    assert len(problem) == 37
+    mean, swing = np.array([0.3, 0.1 if vector else 0.0]) * P, np.array([P, 0.0])
+    given = {"force": 0.5 * (mean if vector else mean[0]), "kind": kind}
+    limit = cr.shakedown(PAPER, load=P, force_amplitudes=swung(kind, 0.5 * P), **given)
+    kernel = problem.kernel if vector else np.kron(problem.influence.matrix, np.eye(2))
+    slid: dict[float, list[float]] = {0.99: [], 1.01: []}
+    for part, slips in slid.items():
+        state = Stuck(kernel + np.diag(np.repeat(problem.compliance, 2)), problem.loads)
         for _ in range(40):
-            cycle = 0.0
-            for turn in swing:
-                state.go((mean + part * limit.factor * turn) / unit)
-                cycle += float(np.abs(state.slip).max())
-            slips.append(cycle)
-        slid[part] = slips
-    assert n == 37
+            slips.append(0.0)
+            for turn in (swing, -swing):
+                state.go((mean + part * limit.factor * turn) / problem.units.force)
+                slips[-1] += float(np.abs(state.slip).max())
     assert slid[0.99][0] > 1e-3 * slid[1.01][-1]  # something slides at first
     assert slid[0.99][-1] < 0.03 * slid[1.01][-1]
     assert slid[0.99][-1] < 0.5 * slid[0.99][19] + LEFT * slid[1.01][-1]
