@@ -5,12 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenes import MATERIAL
 
 import convexrough as cr
 from convexrough.friction import order
 from convexrough.friction.levels import FrictionLevels
-
-MATERIAL = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
 
 
 def test_no_onset_where_an_indentation_falls() -> None:

@@ -5,12 +5,10 @@ import pytest
 from flint import fmpq, fmpq_mat
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from convexrough.arrays import Array
 from convexrough.convex.definite import is_definite, proved_margin
 from convexrough.roundoff import ROUNDOFF
-
-Array = NDArray[np.float64]
 
 
 def proves_margin(couplings: Array, margin: float, entry_error: float) -> bool:

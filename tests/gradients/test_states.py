@@ -24,6 +24,7 @@ from gradient_oracle import (
     press,
 )
 from levels_reference import Level, of_setup
+from multiprecision import travel_of
 from path_scenes import shaded
 from scenes import hexagonal
 
@@ -139,25 +140,19 @@ def walked(contact: cr.Contact, steps: Any, start: Any, weights: Any) -> Callabl
     """From loads and forces, rational, to losses and displacements, in many digits."""
 
     def value(setup: Setup, P: list[Fraction], Q: list[Fraction], f: Fraction) -> Any:
-        levels: dict[Fraction, tuple[Any, Any]] = {}
-
-        def at(load: Fraction) -> tuple[Any, Any]:
-            if load not in levels and load == 0:
-                highest = int(np.argmax(contact.scene.offsets))
-                rest = Level(setup, contact)
-                levels[load] = arb(0), -rest.offsets[highest]
-            if load not in levels:
-                wanted = arb(load.numerator) / arb(load.denominator)
-                near = near_to(contact.scene, float(load))
-                found = Level(replace(setup, control=wanted, by_load=True), near)
-                levels[load] = found.energy, found.approach
-            return levels[load]
-
         def number(each: Fraction) -> Any:
             return arb(each.numerator) / arb(each.denominator)
 
-        nu = setup.poisson_ratio
-        travel = (2 - nu) / (2 * (1 - nu)) * setup.friction
+        @cache
+        def at(load: Fraction) -> tuple[Any, Any]:
+            """V and D0; the highest asperity just touches at the load 0."""
+            if load == 0:
+                return arb(0), -Level(setup, contact).offsets[np.argmax(contact.scene.offsets)]
+            there = replace(setup, control=number(load), by_load=True)
+            found = Level(there, near_to(contact.scene, float(load)))
+            return found.energy, found.approach
+
+        travel = travel_of(setup.friction, setup.poisson_ratio)
         curve, total = MemoryCurve.pressed(start), arb(0)
         for point, (lost, moved) in zip(steps, weights, strict=True):
             curve, pieces = curve.go(P[point], Q[point] / f)

@@ -5,16 +5,14 @@ import pytest
 from flint import arb
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from point_layouts import on_lattice
 
+from convexrough.arrays import Array
 from convexrough.influence.coupling import inverse_distances
 from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.lattice import LEAST_NEGATIVE
 from convexrough.influence.lattice_symbol import LOST, TOLERANCE, _Symbol, least_symbol
 from convexrough.scene.lattice import Lattice, _shortest
-
-Array = NDArray[np.float64]
 
 HEXAGONAL = np.array([[1.0, 0.0], [0.5, np.sqrt(0.75)]])
 SCALE = 0.37

@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 from extended import inverse_sums, pulled
 from flint import arb, ctx
-from numpy.typing import NDArray
 from point_layouts import BASES, LAYOUTS, lattice_patch, on_lattice, turned
 
 import convexrough as cr
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair, two_product
+from convexrough.arrays import Array
 from convexrough.bench.scenes import APPROACH
 from convexrough.bench.scenes import scene as bench_scene
 from convexrough.influence import lattice
@@ -34,8 +34,6 @@ from convexrough.normal.refine import trial
 from convexrough.roundoff import ROUNDOFF
 from convexrough.scene.lattice import Lattice
 from convexrough.solvers import Newton
-
-Array = NDArray[np.float64]
 
 SCALE = 0.37
 

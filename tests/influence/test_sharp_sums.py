@@ -7,17 +7,15 @@ from math import ceil, floor, log2
 import numpy as np
 import pytest
 from flint import arb, ctx
-from numpy.typing import NDArray
 from point_layouts import disc
 
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair
+from convexrough.arrays import Array
 from convexrough.influence import sharp_sums as sharp
 from convexrough.influence.pair_sums import Product
 from convexrough.influence.softened import Softened, exact_series
 from convexrough.influence.splitting import Splitting
-
-Array = NDArray[np.float64]
 
 SPACING = 0.0371
 KERNELS = {order: Softened(1, order, 0.43) for order in (4, 12, 26)}

@@ -11,10 +11,9 @@ from point_layouts import on_lattice
 
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair
+from convexrough.arrays import Array
 from convexrough.influence.convolution import SiteBox, through_waves
 from convexrough.influence.sliced import Distances, Sliced, cut
-
-Array = NDArray[np.float64]
 
 BASES = {
     "hexagonal": [[1.0, 0.0], [0.5, 0.8660254037844386]],

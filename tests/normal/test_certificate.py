@@ -7,7 +7,6 @@ import pytest
 from attacks import ATTACKS, assert_honest, attack, excess
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from scenes import (
     CASES,
     MATERIAL,
@@ -31,8 +30,6 @@ from convexrough.arithmetic.pairs import Pair
 from convexrough.influence.coupling import Kind
 from convexrough.normal.boxes import MARGINS, box_of_touching, convex_margin, tried
 from convexrough.normal.problem import NormalProblem
-
-Array = NDArray[np.float64]
 
 
 @pytest.mark.sample(4)

@@ -9,11 +9,11 @@ import pytest
 from attacks import assert_honest, excess
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from scenes import OPERATORS, hexagonal, on_sphere, operators, solve_exactly
 
 import convexrough as cr
 from convexrough.arithmetic.pairs import Pair
+from convexrough.arrays import Array
 from convexrough.bench.scenes import scene as bench
 from convexrough.contact import levels_of
 from convexrough.convex.definite import proved_sparse_margin
@@ -25,8 +25,6 @@ from convexrough.normal.problem import NormalProblem
 from convexrough.normal.proved import solution_in
 from convexrough.normal.refine import trial
 from convexrough.solvers import Newton
-
-Array = NDArray[np.float64]
 
 
 def random_points(seed: int, count: int, size: float = 1.0) -> cr.Scene:
@@ -250,10 +248,8 @@ def test_poor_loads_of_a_prescribed_total_do_not_exclude_another_solution() -> N
 
     The bound on the approach took the displacement of other loads than its weights.
     """
-    sites = np.array(
-        [(i + 0.5 * j, j * np.sqrt(3) / 2) for i in range(-4, 5) for j in range(-4, 5)]
-    )
-    bank = sites[np.argsort(np.hypot(*sites.T), kind="stable")][:13]
+    bank = cr.Asperities.hexagonal(spacing=1.0, tip_radius=0.4, within=1.9).positions
+    assert len(bank) == 13
     apart, far = 1e-2, 1e4
     loads = cr.press(on_sphere(bank, 0.4, radius=np.inf), approach=1.0).loads
     tips = (2.28 * apart) ** 2 / 0.5, (2.65 * apart) ** 2 / 0.475
