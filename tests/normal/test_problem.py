@@ -146,19 +146,13 @@ def test_the_bound_is_above_the_approach(rough: dict[str, Any], load: float) -> 
 def test_bounds_cover_all_loads_within_an_uncertain_total() -> None:
     pair = cr.Asperities([[-1e-3, 0.0], [1e-3, 0.0]], 0.02)  # alike: the loads only scale
     problem = assembled(cr.Scene(1.0, pair, MATERIAL), load=1e-8)
-    total = problem.load
-    assert total is not None
+    total: Any = problem.load
     state = refined_loads(problem, Newton().solve(problem).loads)
     box = tried(problem, state.loads.high, state.product)
-    wide, higher = (
-        proved(each, refined_loads(each, state.loads.high), box)
-        for each in (
-            problem.at_load(Ball.around(total, 1e-6 * total)),
-            problem.at_load(Ball.exact(total * (1 + 0.999e-6))),
-        )
-    )
-    assert wide.box is box
-    assert higher.box is box
+    totals = Ball.around(total, 1e-6 * total), Ball.exact(total * (1 + 0.999e-6))
+    problems = [problem.at_load(each) for each in totals]
+    wide, higher = (proved(each, refined_loads(each, state.loads.high), box) for each in problems)
+    assert wide.box is higher.box is box
     for name in ("loads", "indentation", "approach"):
         moved = np.abs((getattr(higher, name) - getattr(wide, name)).value)
         assert (moved <= getattr(wide, name).radius).all(), name
