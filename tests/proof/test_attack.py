@@ -38,7 +38,7 @@ def honest() -> list[Any]:
             proofs.append(each.proof(sheared=[SimpleNamespace(force=Q) for Q in forces]))
     lifted = cr.press(shaded(), load=2.96)
     proofs.append(lifted.proof(sheared=[SimpleNamespace(force=0.4 * lifted.load)]))
-    loads = cr.press(lifted.scene, load=2.96).loads * (1 + 1e-3 * (np.arange(6) == 0))
+    loads = lifted.loads * (1 + 1e-3 * (np.arange(6) == 0))
     proofs.append(prove(lifted.scene, loads, load=2.96))
     proofs += [crowded(3, 5, 1.9, 0.5).proof(), crowded(9, 6, 2.2, 0.1).proof()]
     documents = [json.loads(json.dumps(proof.document)) for proof in proofs]
