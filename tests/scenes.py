@@ -72,6 +72,13 @@ def complementary_energy(contact: cr.Contact) -> float:
     return float(0.6 * k @ P ** (5 / 3) + P @ (1 / (np.pi * E * apart)) @ P / 2 - scene.offsets @ P)
 
 
+def stepped(scene: cr.Scene, by: float, steps: dict[str, Any]) -> cr.Scene:
+    """With asperities changed by so many times these steps of their heights and so on."""
+    a = scene.asperities
+    moved = {name: getattr(a, name) + by * step for name, step in steps.items()}
+    return replace(scene, asperities=replace(a, **moved))
+
+
 def scaled(scene: cr.Scene, length: float, modulus: float) -> cr.Scene:
     """In other units: lengths times `length`, moduli times `modulus`."""
     a, material = scene.asperities, scene.material

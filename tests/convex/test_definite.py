@@ -22,13 +22,8 @@ def exact(value: float) -> fmpq:
 def above(couplings: Array, margin: fmpq) -> bool:
     """Whether I + M > margin I, by the signs of all leading minors: no rounding."""
     n = len(couplings)
-    shifted = fmpq_mat(
-        [[1 - margin if i == j else exact(couplings[i, j]) for j in range(n)] for i in range(n)]
-    )
-    minors = (
-        fmpq_mat([[shifted[i, j] for j in range(m)] for i in range(m)]).det()
-        for m in range(1, n + 1)
-    )
+    shifted = np.vectorize(exact, otypes=[object])(couplings) + (1 - margin) * np.eye(n, dtype=int)
+    minors = (fmpq_mat(shifted[:m, :m].tolist()).det() for m in range(1, n + 1))
     return all(minor > 0 for minor in minors)
 
 

@@ -10,7 +10,7 @@ from flint import arb, ctx
 from friction_scenes import FRICTION, SCENES, pressed, with_friction
 from gradient_oracle import DIGITS, STEP, Setup, assert_close, exact, known
 from levels_reference import of_setup
-from scenes import hexagonal, paper
+from scenes import OPERATORS, hexagonal, paper, stepped
 
 import convexrough as cr
 
@@ -115,19 +115,15 @@ def test_gross_sliding_from_one_side() -> None:
     top = contact.gradient(approach=1.0).heights
     unit = 2.0 * gradient.poisson_ratio / gradient.value  # c_t by its derivative, and f
     assert unit > 0
-    first = int(np.argmax(contact.scene.offsets))
+    first = np.arange(len(top)) == np.argmax(contact.scene.offsets)
     ratio = (2 - 0.3) / (2 * 0.7) * FRICTION
-    expected = ratio * top
-    expected[first] += ratio
-    np.testing.assert_allclose(moved.heights, expected, rtol=1e-14)
+    np.testing.assert_allclose(moved.heights, ratio * (top + first), rtol=1e-14)
 
 
 def test_many_asperities_by_every_operator() -> None:
     scene = with_friction(hexagonal(2.5e-4, 2e-3, 2.5e-3, height_std=3e-8, seed=1))
-    found = {}
-    for kind in ("dense", "lattice", "scattered"):
-        contact = cr.press(scene, load=1e-8, influence=kind)  # type: ignore[arg-type]
-        found[kind] = cr.cycle(contact, maximum=0.2 * contact.load).gradient()
+    contacts = {kind: cr.press(scene, load=1e-8, influence=kind) for kind in OPERATORS}
+    found = {kind: cr.cycle(each, maximum=2e-9).gradient() for kind, each in contacts.items()}
     for kind, each in found.items():
         for name in ("heights", "tip_radii", "positions", "sphere_radius", "contact_modulus"):
             values, errors = known(each, name)
@@ -146,17 +142,13 @@ def test_normalised(name: str, holding: Any) -> None:
     force = 0.3 * contact.load
     gradient = cr.cycle(contact, maximum=force).gradient().normalised
     scene, rng = contact.scene, np.random.default_rng(2)
-    a, E = scene.asperities, scene.material.contact_modulus
-    steps = {
-        "heights": 1e-8 * rng.normal(size=len(a)),
-        "positions": 1e-4 * rng.normal(size=(len(a), 2)),
-    }
-    steps |= {"tip_radii": a.tip_radii * rng.normal(size=len(a))}
+    n, E = len(scene), scene.material.contact_modulus
+    steps = {"heights": 1e-8 * rng.normal(size=n), "positions": 1e-4 * rng.normal(size=(n, 2))}
+    steps["tip_radii"] = scene.asperities.tip_radii * rng.normal(size=n)
 
     def normalised(h: float) -> float:
-        moved = replace(a, **{name: getattr(a, name) + h * steps[name] for name in steps})
         material, radius = cr.Material(E + 0.4 * h, 0.3), scene.sphere_radius + 0.7 * h
-        there = cr.Scene(radius, moved, material, FRICTION, scene.geometry)
+        there = replace(stepped(scene, h, steps), material=material, sphere_radius=radius)
         pressed = cr.press(there, **{holding: getattr(contact, holding)})
         return cr.cycle(pressed, maximum=force).loss_normalised
 
