@@ -14,7 +14,7 @@ import multiprecision
 import numpy as np
 from flint import arb, ctx
 from multiprecision import Friction, slide, travel_of
-from scenes import on_lattice, operators, scaled, scattered, solve_exactly
+from scenes import on_lattice, on_sphere, operators, scaled, scattered, solve_exactly
 from vector_oracle import solve_vectors
 
 import convexrough as cr
@@ -86,8 +86,7 @@ def draw(seed: int) -> tuple[str, cr.Scene, float]:
     count = int(rng.integers(1, 8))
     if kind == "ring":
         angles = 2 * np.pi * np.arange(count) / count + rng.uniform(0, 1)
-        points = 3e-3 * np.column_stack((np.cos(angles), np.sin(angles)))
-        scene = cr.Scene(1.0, cr.Asperities(points, 0.02), cr.Material(1.0, 0.3), geometry="summit")
+        scene = on_sphere(3e-3 * np.column_stack((np.cos(angles), np.sin(angles))))
         approach = float(rng.uniform(2e-5, 9e-5))
     else:
         scene, approach = make(int(rng.integers(2**32)), count, crowding, roughness)
@@ -95,9 +94,8 @@ def draw(seed: int) -> tuple[str, cr.Scene, float]:
         scene = _grazing(scene, approach, rng)
     if kind == "near":  # two asperities much closer than the others
         a = scene.asperities
-        points = np.vstack((a.positions, a.positions[0] + 1e-2 * np.abs(a.positions).max()))
-        radii = np.append(a.tip_radii, 1e-7 * a.tip_radii[0])
-        scene = replace(scene, asperities=cr.Asperities(points, radii, np.append(a.heights, 0.0)))
+        beside = a.positions[0] + 1e-2 * np.abs(a.positions).max()
+        scene = _grown(scene, beside, 1e-7 * a.tip_radii[0], 0.0)
     if kind == "units":
         length, modulus = 10.0 ** rng.uniform(-40, 40), 10.0 ** rng.uniform(-40, 40)
         scene = scaled(scene, length, modulus / scene.material.contact_modulus)
@@ -105,21 +103,22 @@ def draw(seed: int) -> tuple[str, cr.Scene, float]:
     return kind, replace(scene, friction=FRICTION), approach
 
 
+def _grown(scene: cr.Scene, point: Any, tip_radius: float, height: float) -> cr.Scene:
+    """With one asperity more."""
+    a = scene.asperities
+    points, heights = np.vstack((a.positions, point)), np.append(a.heights, height)
+    more = cr.Asperities(points, np.append(a.tip_radii, tip_radius), heights)
+    return replace(scene, asperities=more)
+
+
 def _grazing(scene: cr.Scene, approach: float, rng: np.random.Generator) -> cr.Scene:
     """One asperity more, which touches or fails to by 1e-6 to 1e-17 of the approach."""
-    a = scene.asperities
-    size = float(np.abs(a.positions).max()) or approach
-    point = size * rng.uniform(1.2, 1.5, 2)
-    low = -2.0 * approach
-
-    def grown(height: float) -> cr.Scene:
-        points, heights = np.vstack((a.positions, point)), np.append(a.heights, height)
-        radii = np.append(a.tip_radii, np.median(a.tip_radii))
-        return replace(scene, asperities=cr.Asperities(points, radii, heights))
-
-    gap = cr.press(grown(low), approach=approach).gaps[-1]
+    a, low = scene.asperities, -2.0 * approach
+    point = (float(np.abs(a.positions).max()) or approach) * rng.uniform(1.2, 1.5, 2)
+    tip = float(np.median(a.tip_radii))
+    gap = cr.press(_grown(scene, point, tip, low), approach=approach).gaps[-1]
     off = rng.choice([-1, 1]) * 10.0 ** rng.uniform(-17, -6) * approach
-    return grown(float(low + gap + off))
+    return _grown(scene, point, tip, float(low + gap + off))
 
 
 def audit(seeds: Iterator[int] | range) -> Tally:

@@ -233,8 +233,7 @@ def assert_path(gradient: cr.Gradient, contact: cr.Contact, P: Any, Q: Any, valu
 )
 def test_paths(name: str, number: str) -> None:
     contact = small(within=0.0026)
-    loads, parts = np.array(PATHS[name])
-    P, Q = loads * contact.load, parts * contact.load
+    P, Q = np.array(PATHS[name]) * contact.load
     m = len(P)
     if number == "losses of the steady cycle":
         order = [*range(m), 0, *range(1, m), 0]
