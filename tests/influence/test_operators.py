@@ -15,6 +15,7 @@ import pytest
 from extended import inverse_sums, pulled
 from flint import arb, ctx
 from point_layouts import BASES, LAYOUTS, lattice_patch, on_lattice, turned
+from scenes import paper
 
 import convexrough as cr
 from convexrough.arithmetic.balls import Ball
@@ -290,7 +291,7 @@ def test_gaps_on_a_lattice(geometry: Any, R: Any, shift: float | None) -> None:
     if shift is None:  # exactly on their sites
         lattice, shift = cr.Asperities.square(spacing=2.0**-9, tip_radius=0.02, within=0.01), 0.0
     else:
-        lattice = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
+        lattice = paper().asperities
     heights = 1e-6 * np.random.default_rng(4).standard_normal(len(lattice))
     asperities = cr.Asperities(lattice.positions + shift, 0.02, heights)
     scene = cr.Scene(R, asperities, cr.Material(0.7, 0.3), geometry=geometry)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from extended import inverse_sums
 from point_layouts import jittered
+from scenes import on_sphere
 
 import convexrough as cr
 from convexrough.influence.coupling import inverse_distances
@@ -59,10 +60,9 @@ def test_presses_of_points_in_distant_clusters() -> None:
     rng = np.random.default_rng(10)
     patch = np.stack(np.meshgrid(np.arange(30), np.arange(30)), -1).reshape(-1, 2)
     patch = patch + rng.uniform(-0.3, 0.3, patch.shape)
-    material = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
     far = np.array([[2e4, 1e4]])
     for points in (np.vstack((patch, patch + far)), np.vstack((patch, far))):
-        scene = cr.Scene(np.inf, cr.Asperities(points, 10.0), material, geometry="summit")
+        scene = on_sphere(points, 10.0, radius=np.inf)
         assert cr.press(scene, approach=0.02, influence="scattered").iterations <= 8
 
 

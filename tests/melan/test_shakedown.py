@@ -12,7 +12,7 @@ from flint import arb
 from multiprecision import solve_linear
 from numpy.testing import assert_allclose
 from path_scenes import LARGEST, PAPER, SCENES, shaded
-from scenes import solve_exactly, twins
+from scenes import on_sphere, solve_exactly, twins
 from scipy.sparse import csc_matrix
 from vector_oracle import tangential_kernel
 
@@ -280,11 +280,8 @@ def test_a_contact_that_is_not_proved_proves_no_limit(kind: Any) -> None:
 
 @pytest.mark.parametrize("kind", ["exact", "elastic", "vector"])
 def test_one_asperity_slides_on_only_as_all_do(kind: Any) -> None:
-    alone = cr.Asperities([[0.0, 0.0]], 1.0)
-    scene = cr.Scene(1.0, alone, cr.Material(1.0, 0.3), friction=0.5, geometry="summit")
-    amplitudes = swung(kind, 1e-7)
-    found = cr.shakedown(scene, load=1e-6, force_amplitudes=amplitudes, kind=kind)
-    assert found.factor == pytest.approx(5.0)
-    assert found.gross == pytest.approx(5.0)
+    alone, amplitudes = on_sphere([[0.0, 0.0]], 1.0, friction=0.5), swung(kind, 1e-7)
+    found = cr.shakedown(alone, load=1e-6, force_amplitudes=amplitudes, kind=kind)
+    assert [found.factor, found.gross] == pytest.approx([5.0, 5.0])
     assert found.proved
     assert found.gap < 1e-10

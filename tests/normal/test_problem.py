@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scenes import (
-    MATERIAL,
     OPERATORS,
     PAPER_APPROACH,
     hexagonal,
@@ -144,8 +143,8 @@ def test_the_bound_is_above_the_approach(rough: dict[str, Any], load: float) -> 
 
 
 def test_bounds_cover_all_loads_within_an_uncertain_total() -> None:
-    pair = cr.Asperities([[-1e-3, 0.0], [1e-3, 0.0]], 0.02)  # alike: the loads only scale
-    problem = assembled(cr.Scene(1.0, pair, MATERIAL), load=1e-8)
+    pair = on_sphere([[-1e-3, 0.0], [1e-3, 0.0]])  # alike: the loads only scale
+    problem = assembled(pair, load=1e-8)
     total: Any = problem.load
     state = refined_loads(problem, Newton().solve(problem).loads)
     box = tried(problem, state.loads.high, state.product)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from scenes import MATERIAL, paper
+from scenes import MATERIAL, hexagonal, paper
 
 import convexrough as cr
 from convexrough.scene.asperities import CUT_DEVIATIONS, largest_tip_radius
@@ -95,8 +95,7 @@ def square(**options: Any) -> cr.Asperities:
 
 def fine() -> cr.Scene:
     """Memory is asked for so many before it is taken."""
-    asperities = cr.Asperities.hexagonal(spacing=2e-5, tip_radius=1e-4, within=0.0102)
-    return cr.Scene(1.0, asperities, MATERIAL, geometry="summit")
+    return hexagonal(spacing=2e-5, tip_radius=1e-4)
 
 
 def one(radius: float = 1.0, **options: Any) -> cr.Scene:

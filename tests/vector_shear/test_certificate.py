@@ -31,20 +31,19 @@ def test_attacks_on_the_statuses(name: str, fraction: float, kind: str, seed: in
     good = FrictionNewton().solve(problem, total)
     rng = np.random.default_rng(seed)
     q, displacement, slips = good.increments.copy(), good.displacement, good.slips.copy()
-    size = 10.0 ** rng.uniform(-14, -1)
+    size, (i, j) = 10.0 ** rng.uniform(-14, -1), rng.integers(len(q), size=2)
     if kind == "swap":
-        i, j = rng.integers(len(q), size=2)
         q[[i, j]] = q[[j, i]]
     elif kind == "perturb":
         q *= 1 + size * rng.standard_normal(q.shape)
     elif kind == "turn":
         q += size * rng.standard_normal((len(q), 1)) * q[:, ::-1] * [-1, 1]
     elif kind == "drop":
-        q[rng.integers(len(q))] = 0.0
+        q[i] = 0.0
     elif kind == "zero":
         q[:] = 0.0
     elif kind == "slip":
-        slips[rng.integers(len(q))] += size * displacement
+        slips[i] += size * displacement
     else:
         displacement = displacement * (1 + size * rng.standard_normal(2))
     q /= np.maximum(lengths(q) / problem.loads, 1.0)[:, None]
