@@ -241,14 +241,14 @@ def test_a_solver_that_lies_does_not_move_the_limit(lie: str, monkeypatch: Any) 
     def liar(*arguments: object) -> RawAnswer:
         raw = honest(*arguments)
         x, z = raw.x, raw.multipliers
-        if lie == "nothing":
-            return raw._replace(x=0 * x, multipliers=1e-3 * rng.standard_normal(len(z)))
-        if lie == "noise":
-            noise = [1 + 0.05 * rng.standard_normal(len(each)) for each in (x, z)]
-            return raw._replace(x=x * noise[0], multipliers=z * noise[1])
-        if lie == "doubled":
-            return raw._replace(x=2 * x, multipliers=2 * z)
-        return raw._replace(x=-x, multipliers=-z)
+        noise = [rng.standard_normal(len(each)) for each in (x, z)]
+        x, z = {
+            "nothing": (0 * x, 1e-3 * noise[1]),
+            "noise": (x * (1 + 0.05 * noise[0]), z * (1 + 0.05 * noise[1])),
+            "doubled": (2 * x, 2 * z),
+            "backwards": (-x, -z),
+        }[lie]
+        return raw._replace(x=x, multipliers=z)
 
     monkeypatch.setattr(melan, "run_clarabel", liar)
     found = cr.shakedown(PAPER, load=P, force_amplitudes=swing, kind="vector")

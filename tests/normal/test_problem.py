@@ -1,5 +1,6 @@
 """The normal problem: derivatives, bounds, convexity, and contacts with known answers."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -42,8 +43,8 @@ def assembled(scene: cr.Scene, **control: Any) -> NormalProblem:
 
 
 def test_screening_drops_only_those_that_cannot_touch() -> None:
-    problem = assembled(paper(), approach=PAPER_APPROACH)
-    assert len(problem) == 61  # the ring at 4 spacings lies at D = 0 to rounding, and is kept
+    # The ring at 4 spacings lies at D = 0 to rounding, and is kept.
+    assert len(assembled(paper(), approach=PAPER_APPROACH)) == 61
     problem = assembled(paper(), approach=1e-5)
     inside = paper().asperities.distances < np.sqrt(2e-5)
     assert set(problem.candidates) == set(np.flatnonzero(inside))
@@ -125,20 +126,11 @@ def test_nothing_where_the_smooth_sphere_would_touch(prescribed: dict[str, Any])
 @pytest.mark.parametrize("load", [1e-9, 2e-7])
 def test_the_bound_is_above_the_approach(rough: dict[str, Any], load: float) -> None:
     """How far a scene has to reach under a load."""
-
-    def scene_within(within: float) -> cr.Scene:
-        return hexagonal(within=within, **rough)
-
-    def farthest(approach: float) -> float:
-        return reach(
-            approach,
-            sphere_radius=1.0,
-            tip_radius=largest_tip_radius(0.02, rough.get("tip_radius_cv", 0.0)),
-            height=CUT_DEVIATIONS * rough.get("height_std", 0.0),
-            geometry="summit",
-        )
-
-    scene, bound = all_that_could_touch(scene_within, farthest, load)
+    tip = largest_tip_radius(0.02, rough.get("tip_radius_cv", 0.0))
+    height = CUT_DEVIATIONS * rough.get("height_std", 0.0)
+    highest = dict(sphere_radius=1.0, tip_radius=tip, height=height, geometry="summit")
+    scene_within = partial(hexagonal, 0.0025, 0.02, **rough)
+    scene, bound = all_that_could_touch(scene_within, partial(reach, **highest), load)
     assert cr.press(scene, load=load).certificate.approach <= bound * (1 + 1e-12)
 
 
