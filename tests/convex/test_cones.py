@@ -50,16 +50,15 @@ def bernstein(polynomial: Any, limit: Any) -> list[Fraction]:
     """Its coefficients in the Bernstein basis of 0 <= s <= 1, 0 <= S <= limit."""
     scaled = sp.Poly(polynomial.subs(S, limit * S), s, S)
     m, n = scaled.degree(s), scaled.degree(S)
-    power = {(i, j): scaled.coeff_monomial(s**i * S**j) for i in range(m + 1) for j in range(n + 1)}
-    return [
-        sum(
-            power[i, j] * Fraction(comb(a, i) * comb(b, j), comb(m, i) * comb(n, j))
-            for i in range(a + 1)
-            for j in range(b + 1)
+
+    def coefficient(a: int, b: int) -> Any:
+        parts = (
+            c * Fraction(comb(a, i) * comb(b, j), comb(m, i) * comb(n, j))
+            for (i, j), c in scaled.terms()
         )
-        for a in range(m + 1)
-        for b in range(n + 1)
-    ]
+        return sum(parts)
+
+    return [coefficient(a, b) for a in range(m + 1) for b in range(n + 1)]
 
 
 @pytest.mark.parametrize("cones", [FOUR_CONES, FIVE_CONES])

@@ -77,17 +77,12 @@ def test_every_later_cycle_is_the_same(sampled: tuple[cr.Scene, float], seed: in
 
 def test_losses_against_phase() -> None:
     """Rows are closed paths of their own; the smooth sphere has a closed form in step."""
-    scene, P = SCENES["paper"], 0.7 * LARGEST["paper"]
-    p, t = 0.2 * P, 0.3 * P
-    found = cr.phase_losses(
-        scene, load=P, load_amplitude=p, force_amplitude=0.5 * t, phases=[0.0, 0.7, np.pi / 2],
-        factors=[1.0, 0.5], chords=12,
-    )  # fmt: skip
-    assert found.phases.tolist() == [0.0, 0.7, np.pi / 2] * 2
+    scene, P, phases = SCENES["paper"], 0.7 * LARGEST["paper"], [0.0, 0.7, np.pi / 2]
+    ellipse = dict(load=P, load_amplitude=0.2 * P, force_amplitude=0.15 * P, chords=12)
+    found = cr.phase_losses(scene, **ellipse, phases=phases, factors=[1.0, 0.5])
+    assert found.phases.tolist() == phases * 2
     assert found.factors.tolist() == [1.0] * 3 + [0.5] * 3
-    loads, forces = cr.elliptic_path(
-        load=P, load_amplitude=p, force_amplitude=0.5 * t, phase=0.7, friction=0.5, chords=12
-    )
+    loads, forces = cr.elliptic_path(**ellipse, phase=0.7, friction=0.5)
     alone = cr.steady(scene, loads=loads, forces=forces)
     assert found.losses[1] == alone.loss
     assert found.levels[1] == alone.level
