@@ -276,18 +276,17 @@ def audit_vectors(
     touching = [i for i, load in enumerate(full.loads) if load > 0]
     for i, slides in zip(touching, true.sliding, strict=True):
         require(state.status[i] != ("partial" if slides else "sliding"), f"tensor: status of {i}")
-    nu = arb(tilted.scene.material.poisson_ratio)
+    nu, proof = arb(tilted.scene.material.poisson_ratio), state.certificate
     with ctx.workdps(DIGITS + 30):
         travel, forces = travel_of(arb(FRICTION), nu), FRICTION * true.forces
-        slips, displacement = travel * true.slips, travel * true.displacement
-    proof = state.certificate
+        slips, far = travel * true.slips, [travel * true.displacement]
     errors = proof.force_errors[touching]
     tally.compare(operator, "tensor force", errors, state.forces[touching], forces)
     if np.isfinite(state.displacement).all():
         errors = proof.slip_errors[touching]
         tally.compare(operator, "tensor slip", errors, state.slips[touching], slips)
         errors = [proof.displacement_error]
-        tally.compare(operator, "tensor displacement", errors, [state.displacement], [displacement])
+        tally.compare(operator, "tensor displacement", errors, [state.displacement], far)
 
 
 def _with_poisson(contact: cr.Contact, nu: float) -> cr.Contact:

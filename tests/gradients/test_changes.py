@@ -31,15 +31,11 @@ def direction(contact: cr.Contact, holding: str, force: float, seed: int = 0) ->
 
 def moved(setup: Setup, along: cr.Direction, holding: str, by: Any) -> Setup:
     """The setup, by so many times the direction."""
+    names = ["heights", "tip_radii", "positions", "sphere_radius", "contact_modulus"]
     steps = {
-        name: exact(np.asarray(getattr(along, name), dtype=float))
-        for name in ("heights", "tip_radii", "positions")
+        name: exact(getattr(along, name))[()] for name in (*names, "poisson_ratio", "friction")
     }
-    for name in ("sphere_radius", "contact_modulus", "poisson_ratio", "friction"):
-        steps[name] = arb(float(getattr(along, name)))
-    steps["control"] = arb(float(getattr(along, holding)))
-    if len(setup.forces):
-        steps["forces"] = exact(np.array([along.force]))
+    steps |= {"control": arb(getattr(along, holding)), "forces": exact([along.force])}
     return replace(setup, **{name: getattr(setup, name) + by * it for name, it in steps.items()})
 
 

@@ -24,8 +24,7 @@ def edited(
 ) -> cr.Scene:
     """Some of the asperities, moved sideways and up."""
     a = whole.asperities
-    heights = a.heights + raised
-    some = cr.Asperities(a.positions[kept] + shift, a.tip_radii[kept], heights[kept])
+    some = cr.Asperities(a.positions[kept] + shift, a.tip_radii[kept], (a.heights + raised)[kept])
     return replace(whole, asperities=some)
 
 
