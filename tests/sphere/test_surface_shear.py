@@ -17,10 +17,9 @@ RATIOS = [0.0, 0.3, 0.5]
 DIRECTIONS = np.array([0.0, 0.7, np.pi / 2, 2.5])
 
 
-def displacement(r: Any, angle: Any, nu: float, share: float = 1.0) -> Any:
-    return surface_shear.surface_displacement(
-        r * np.cos(angle), r * np.sin(angle), A, share, PEAK, G, nu
-    )
+def displacement(r: float, angle: float, nu: float, share: float = 1.0) -> Any:
+    x, y = r * np.cos(angle), r * np.sin(angle)
+    return surface_shear.surface_displacement(x, y, A, share, PEAK, G, nu)
 
 
 def cerruti(r: float, angle: float, nu: float, a: float, q0: float) -> float:
