@@ -5,12 +5,10 @@ from typing import Any
 import multiprecision
 import numpy as np
 from flint import arb, ctx
-from numpy.typing import NDArray
 from status_audit import Tally, audit_pressed
 
 import convexrough as cr
-
-Array = NDArray[np.float64]
+from convexrough.arrays import Array
 
 
 def assert_honest(certificate: cr.Certificate, loads: Array, exact: Any) -> None:

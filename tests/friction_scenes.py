@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from flint import arb, ctx
-from scenes import NAMED
+from scenes import NAMED, hexagonal
 
 import convexrough as cr
 from convexrough import FrictionConic, VectorShearState, shear_vector
@@ -25,31 +25,35 @@ VECTOR_NAMES = ["paper", "rough", "steel", "rough, closest"]
 def pressed(
     name: str, influence: Any = "dense", control: str = "approach", nu: float = 0.3
 ) -> cr.Contact:
-    scene, approach = NAMED[name]
+    scene, approach = SCENES[name]
     contact = cr.press(with_friction(scene, nu=nu), approach=approach, influence=influence)
     if control == "load":
         return cr.press(contact.scene, load=contact.load, influence=influence)
     return contact
 
 
-def in_doubt(contact: cr.Contact, digits: int, control: str) -> cr.Contact:
+def in_doubt(contact: cr.Contact, digits: int) -> cr.Contact:
     """The contact with rounded loads, and the certificate of those."""
     rounded = np.array([float(f"{load:.{digits - 1}e}") for load in contact.loads])
     # Not symmetric: every other load is off the other way.
     rounded[1::2] += 10.0 ** (-digits) * rounded[1::2]
-    given: Any = {control: getattr(contact, control)}
     return replace(
         contact,
         loads=rounded,
         load=float(rounded.sum()),
         contact_radii=hertz.contact_radius(rounded, 1.0, contact.scene.relative_radii),
-        certificate=cr.certify(contact.scene, rounded, **given, influence=contact.influence),
+        certificate=cr.certify(contact.scene, rounded, approach=contact.approach),
     )
 
 
 def with_friction(scene: cr.Scene, friction: float = FRICTION, nu: float = 0.3) -> cr.Scene:
     material = cr.Material(scene.material.contact_modulus, nu)
-    return cr.Scene(scene.sphere_radius, scene.asperities, material, friction, scene.geometry)
+    return replace(scene, material=material, friction=friction)
+
+
+#: name -> (scene, approach), with friction; "dense" has the crowding 0.88.
+SCENES = {name: (with_friction(scene), approach) for name, (scene, approach) in NAMED.items()}
+SCENES["dense"] = (with_friction(hexagonal(tip_radius=0.07, height_std=1e-6, seed=3)), 5e-5)
 
 
 def off(values: Any, true: Any) -> np.ndarray:

@@ -36,15 +36,13 @@ class Setup:
 
     @classmethod
     def of(cls, contact: cr.Contact, holding: str, forces: Any = ()) -> "Setup":
-        scene, material = contact.scene, contact.scene.material
+        scene, a, material = contact.scene, contact.scene.asperities, contact.scene.material
         prescribed = contact.prescribed_load
         load = contact.load if prescribed is None else prescribed
         control = load if holding == "load" else contact.approach
         numbers = scene.sphere_radius, material.contact_modulus, material.poisson_ratio
         return cls(
-            exact(scene.asperities.positions),
-            exact(scene.asperities.tip_radii),
-            exact(scene.asperities.heights),
+            *map(exact, (a.positions, a.tip_radii, a.heights)),
             *(arb(float(value)) for value in (*numbers, scene.friction or 1.0, control)),
             exact(np.asarray(forces, dtype=float)) if np.size(forces) else np.zeros(0, object),
             scene.geometry,

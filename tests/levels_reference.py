@@ -5,23 +5,15 @@ Two levels make friction states by `multiprecision.slide`; where order fails `Br
 
 from dataclasses import replace
 from functools import cache
-from typing import Any, Literal
 
 import numpy as np
 from flint import arb, ctx
-from friction_scenes import FRICTION, with_friction
+from friction_scenes import FRICTION, pressed
 from gradient_oracle import DIGITS, Balls, Oracle, Setup, exact
 from multiprecision import cube_root, slide, travel_of
-from scenes import NAMED, hexagonal
 
 import convexrough as cr
 from convexrough.arrays import Array
-
-Holding = Literal["load", "approach"]
-
-#: name -> (scene, approach), with friction; "dense" has the crowding 0.88.
-SCENES = {name: (with_friction(scene), approach) for name, (scene, approach) in NAMED.items()}
-SCENES["dense"] = (with_friction(hexagonal(tip_radius=0.07, height_std=1e-6, seed=3)), 5e-5)
 
 
 class Level(Oracle):
@@ -66,7 +58,7 @@ def of_setup(setup: Setup, contact: cr.Contact, near: Friction | None = None) ->
     return Friction(upper, Level(replace(setup, control=left, by_load=True), start), T)
 
 
-def displaced(contact: cr.Contact, displacement: float, holding: Holding = "load") -> Friction:
+def displaced(contact: cr.Contact, displacement: float, holding: str) -> Friction:
     """Moved by X [length]: the level at the approach D0(P) - X / (c_t f)."""
     with ctx.workdps(DIGITS):
         upper = Level(Setup.of(contact, holding), contact)
@@ -78,21 +70,12 @@ def displaced(contact: cr.Contact, displacement: float, holding: Holding = "load
 
 
 @cache
-def reference(name: str, fraction: float, holding: Holding = "approach") -> Friction:
+def reference(name: str, fraction: float, holding: str = "approach") -> Friction:
     """One of SCENES at Q = fraction f P, kept."""
-    contact = pressed(name, holding)
+    contact = pressed(name, control=holding)
     with ctx.workdps(DIGITS):
         setup = Setup.of(contact, holding, [fraction * FRICTION * contact.load])
         return of_setup(setup, contact)
-
-
-@cache
-def pressed(name: str, holding: Holding = "approach", influence: Any = "dense") -> cr.Contact:
-    scene, approach = SCENES[name]
-    contact = cr.press(scene, approach=approach, influence=influence)
-    if holding == "load":
-        return cr.press(scene, load=contact.load, influence=influence)
-    return contact
 
 
 class Bristles:
@@ -151,11 +134,8 @@ class Bristles:
                 break
         else:
             raise ArithmeticError("Newton did not arrive: take smaller steps")
-        self.lost += (
-            self.ratio
-            * self.f**2
-            * float(self.stiffness @ (np.abs(tried - bent) * limits).mean(axis=1))
-        )
+        slid = self.stiffness @ (np.abs(tried - bent) * limits).mean(axis=1)
+        self.lost += self.ratio * self.f**2 * float(slid)
         self.bent, self.deflection, self.delta = bent, eta, delta
 
 

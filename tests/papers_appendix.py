@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from convexrough import checks, fields
-from convexrough.arrays import Array, frozen
+from convexrough import fields
+from convexrough.arrays import Array
 from convexrough.contact import Contact
 from convexrough.friction.shear import ShearState, shear
 from convexrough.sphere import mindlin
@@ -21,7 +21,7 @@ def displacements(state: ShearState) -> Array:
     touching = np.flatnonzero(contact.loads)
     found = np.full(len(contact.loads), np.nan)
     found[touching] = fields.shear_displacement(state, contact.scene.contact_points[touching])
-    return frozen(found)
+    return found
 
 
 def slips(state: ShearState) -> Array:
@@ -32,19 +32,18 @@ def slips(state: ShearState) -> Array:
     if sliding.any():
         furthest = u[sliding][np.argmax(np.abs(u[sliding]))]
         slips[sliding] = (u[adhered].mean() if adhered.any() else furthest) - u[sliding]
-    return frozen(slips)
+    return slips
 
 
 def energies(state: ShearState) -> Array:
     """(n,) [force length] energy lost at each asperity per steady cycle between Q and -Q."""
     contact, scene = state.contact, state.contact.scene
-    friction = checks.friction(scene.friction)
-    limits = friction * contact.loads
+    limits = scene.friction * contact.loads
     indentations = contact.contact_radii**2 / scene.relative_radii
-    scales = 4.8 * mindlin.ratio(scene.material.poisson_ratio) * friction * indentations
+    scales = 4.8 * mindlin.ratio(scene.material.poisson_ratio) * scene.friction * indentations
     shares = np.minimum(np.abs(state.forces) / np.where(limits > 0, limits, 1.0), 1.0)
     forwards = np.sign(state.force) * slips(state)
-    return frozen(limits * (scales * mindlin.loss(shares) + 4.0 * forwards))
+    return limits * (scales * mindlin.loss(shares) + 4.0 * forwards)
 
 
 def cycle_energy(contact: Contact, maximum: float) -> float:

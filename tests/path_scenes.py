@@ -18,7 +18,7 @@ ONE = [(0.6, 0), (0.6, 0.3), (1, 0.3), (1, -0.15), (0.7, -0.15), (0.7, 0.2), (0.
 TWO = [(1, 0.5), (0.3, -0.2), (0.9, 0.35), (0.9, -0.6), (0.05, 0), (0.8, 0.6)]
 
 
-def path_of(name: str, points: list[tuple[float, float]]) -> tuple[cr.Scene, Array, Array]:
+def path_of(name: str, points: Any) -> tuple[cr.Scene, Array, Array]:
     """The scene, and P and Q of these points."""
     P, T = np.array(points).T * LARGEST[name]
     return SCENES[name], P, 0.5 * T
@@ -35,15 +35,17 @@ def on_flat(points: Any, tip_radii: Any, heights: Any) -> cr.Scene:
     return cr.Scene(1e6, asperities, MATERIAL, friction=0.5, geometry="summit")
 
 
+def ring(count: int) -> Array:
+    """So many points around one, at the distance 1."""
+    turn = 2 * np.pi * np.arange(count) / count
+    return np.vstack(([0.0, 0.0], np.column_stack((np.cos(turn), np.sin(turn)))))
+
+
 def around(load: float) -> cr.Contact:
     """Three equal contacts around a shorter one, so crowded that they lift it out again."""
-    turn = 2 * np.pi * np.arange(3) / 3
-    points = np.vstack(([0.0, 0.0], np.column_stack((np.cos(turn), np.sin(turn)))))
-    return cr.press(on_flat(points, 1.0, [-0.05, 0.0, 0.0, 0.0]), load=load)
+    return cr.press(on_flat(ring(3), 1.0, [-0.05, 0.0, 0.0, 0.0]), load=load)
 
 
 def shaded() -> cr.Scene:
     """A small low asperity between five crowded ones: pressed far, it loses load again."""
-    turn = 2 * np.pi * np.arange(5) / 5
-    points = np.vstack(([0.0, 0.0], np.column_stack((np.cos(turn), np.sin(turn)))))
-    return on_flat(points, np.r_[0.05, np.ones(5)], np.r_[-0.06, np.zeros(5)])
+    return on_flat(ring(5), np.r_[0.05, np.ones(5)], np.r_[-0.06, np.zeros(5)])

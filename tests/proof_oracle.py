@@ -57,23 +57,19 @@ def _false_shear(
 
 
 def _solved(scene: Any, radii: list[list[str]], control: Any) -> multiprecision.Reference:
-    x, y, heights, tips = (
-        np.array([float.fromhex(text) for text in scene[key]])
-        for key in ("x", "y", "heights", "tip_radii")
-    )
+    columns = (scene[key] for key in ("x", "y", "heights", "tip_radii"))
+    x, y, heights, tips = (np.array([*map(float.fromhex, column)]) for column in columns)
     a = np.array([sum(map(float.fromhex, radius)) for radius in radii])
     modulus, sphere = float.fromhex(scene["contact_modulus"]), scene["sphere_radius"]
     along = tuple(map(float.fromhex, sphere if isinstance(sphere, list) else [sphere] * 2))
-    summits = SimpleNamespace(positions=np.stack([x, y], 1), tip_radii=tips, heights=heights)
-    material = SimpleNamespace(contact_modulus=modulus)
-    return multiprecision.solve(
-        SimpleNamespace(
-            asperities=summits, sphere_radius=along, material=material, geometry=scene["geometry"]
-        ),
-        digits=DIGITS,
-        start=4 * modulus * a**3 * (sum(1 / R for R in along) / 2 + 1 / tips) / 3,
-        **control,
+    read = SimpleNamespace(
+        asperities=SimpleNamespace(positions=np.stack([x, y], 1), tip_radii=tips, heights=heights),
+        material=SimpleNamespace(contact_modulus=modulus),
+        sphere_radius=along,
+        geometry=scene["geometry"],
     )
+    start = 4 * modulus * a**3 * (sum(1 / R for R in along) / 2 + 1 / tips) / 3
+    return multiprecision.solve(read, digits=DIGITS, start=start, **control)
 
 
 def _number(text: str) -> arb:

@@ -7,7 +7,6 @@ from typing import Any
 import multiprecision
 import numpy as np
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 import convexrough as cr
 from convexrough.influence import Kind, couple
@@ -24,18 +23,12 @@ def hexagonal(
     spacing: float = 0.0025, tip_radius: float = 0.02, within: float = 0.0102, **options: Any
 ) -> cr.Scene:
     """The source paper's example, 61 asperities, or another array on its sphere."""
-    array = cr.Asperities.hexagonal(
-        spacing=spacing, tip_radius=tip_radius, within=within, **options
-    )
-    return cr.Scene(1.0, array, MATERIAL, geometry="summit")
+    options |= dict(spacing=spacing, tip_radius=tip_radius, within=within)
+    return cr.Scene(1.0, cr.Asperities.hexagonal(**options), MATERIAL, geometry="summit")
 
 
 def on_sphere(
-    points: Any,
-    tip_radii: Any = 0.02,
-    heights: Any = 0.0,
-    radius: float = 1.0,
-    friction: Any = None,
+    points: Any, tip_radii: Any = 0.02, heights: Any = 0.0, radius: Any = 1.0, friction: Any = None
 ) -> cr.Scene:
     """Asperities at these points under a sphere of this radius."""
     asperities = cr.Asperities(points, tip_radii, heights)
@@ -62,10 +55,7 @@ def steel(geometry: Any = "summit") -> cr.Scene:
 
 def twins() -> tuple[cr.Scene, float]:
     """Two equal asperities so close that both may touch, but at no least of the energy; a load."""
-    points = [[-5e-5, 0.0], [5e-5, 0.0]]
-    return cr.Scene(
-        1.0, cr.Asperities(points, 0.02), MATERIAL, friction=0.5, geometry="summit"
-    ), 6.6e-8
+    return on_sphere([[-5e-5, 0.0], [5e-5, 0.0]], friction=0.5), 6.6e-8
 
 
 def prescribed(scene: cr.Scene, approach: float, control: str) -> dict[str, float]:
@@ -82,13 +72,20 @@ def complementary_energy(contact: cr.Contact) -> float:
     return float(0.6 * k @ P ** (5 / 3) + P @ (1 / (np.pi * E * apart)) @ P / 2 - scene.offsets @ P)
 
 
+def stepped(scene: cr.Scene, by: float, steps: dict[str, Any]) -> cr.Scene:
+    """With asperities changed by so many times these steps of their heights and so on."""
+    a = scene.asperities
+    moved = {name: getattr(a, name) + by * step for name, step in steps.items()}
+    return replace(scene, asperities=replace(a, **moved))
+
+
 def scaled(scene: cr.Scene, length: float, modulus: float) -> cr.Scene:
     """In other units: lengths times `length`, moduli times `modulus`."""
     a, material = scene.asperities, scene.material
     asperities = cr.Asperities(a.positions * length, a.tip_radii * length, a.heights * length)
     material = cr.Material(material.contact_modulus * modulus, material.poisson_ratio)
     radius = scene.sphere_radius * length
-    return cr.Scene(radius, asperities, material, scene.friction, scene.geometry)
+    return replace(scene, sphere_radius=radius, asperities=asperities, material=material)
 
 
 #: name -> (scene, approach): every one in the convex range.
@@ -157,17 +154,13 @@ def on_lattice(seed: int, count: int, crowding: float, roughness: float) -> tupl
     scene, approach = _pressed(rng, points * separation, separation, crowding, roughness)
     if scene.geometry == "closest":  # contact points of unequal tip radii are not on a lattice
         a = scene.asperities
-        equal = cr.Asperities(a.positions, float(np.median(a.tip_radii)), a.heights)
+        equal = replace(a, tip_radii=np.full(count, np.median(a.tip_radii)))
         scene = replace(scene, asperities=equal)
     return scene, approach
 
 
 def _pressed(
-    rng: np.random.Generator,
-    points: NDArray[np.float64],
-    separation: float,
-    crowding: float,
-    roughness: float,
+    rng: np.random.Generator, points: Any, separation: float, crowding: float, roughness: float
 ) -> tuple[cr.Scene, float]:
     """A random sphere, material, geometry and size for asperities at these points."""
     count = len(points)

@@ -14,7 +14,7 @@ import multiprecision
 import numpy as np
 from flint import arb, ctx
 from multiprecision import Friction, slide, travel_of
-from scenes import on_lattice, operators, scaled, scattered, solve_exactly
+from scenes import on_lattice, on_sphere, operators, scaled, scattered, solve_exactly
 from vector_oracle import solve_vectors
 
 import convexrough as cr
@@ -86,8 +86,7 @@ def draw(seed: int) -> tuple[str, cr.Scene, float]:
     count = int(rng.integers(1, 8))
     if kind == "ring":
         angles = 2 * np.pi * np.arange(count) / count + rng.uniform(0, 1)
-        points = 3e-3 * np.column_stack((np.cos(angles), np.sin(angles)))
-        scene = cr.Scene(1.0, cr.Asperities(points, 0.02), cr.Material(1.0, 0.3), geometry="summit")
+        scene = on_sphere(3e-3 * np.column_stack((np.cos(angles), np.sin(angles))))
         approach = float(rng.uniform(2e-5, 9e-5))
     else:
         scene, approach = make(int(rng.integers(2**32)), count, crowding, roughness)
@@ -95,9 +94,8 @@ def draw(seed: int) -> tuple[str, cr.Scene, float]:
         scene = _grazing(scene, approach, rng)
     if kind == "near":  # two asperities much closer than the others
         a = scene.asperities
-        points = np.vstack((a.positions, a.positions[0] + 1e-2 * np.abs(a.positions).max()))
-        radii = np.append(a.tip_radii, 1e-7 * a.tip_radii[0])
-        scene = replace(scene, asperities=cr.Asperities(points, radii, np.append(a.heights, 0.0)))
+        beside = a.positions[0] + 1e-2 * np.abs(a.positions).max()
+        scene = _grown(scene, beside, 1e-7 * a.tip_radii[0], 0.0)
     if kind == "units":
         length, modulus = 10.0 ** rng.uniform(-40, 40), 10.0 ** rng.uniform(-40, 40)
         scene = scaled(scene, length, modulus / scene.material.contact_modulus)
@@ -105,21 +103,22 @@ def draw(seed: int) -> tuple[str, cr.Scene, float]:
     return kind, replace(scene, friction=FRICTION), approach
 
 
+def _grown(scene: cr.Scene, point: Any, tip_radius: float, height: float) -> cr.Scene:
+    """With one asperity more."""
+    a = scene.asperities
+    points, heights = np.vstack((a.positions, point)), np.append(a.heights, height)
+    more = cr.Asperities(points, np.append(a.tip_radii, tip_radius), heights)
+    return replace(scene, asperities=more)
+
+
 def _grazing(scene: cr.Scene, approach: float, rng: np.random.Generator) -> cr.Scene:
     """One asperity more, which touches or fails to by 1e-6 to 1e-17 of the approach."""
-    a = scene.asperities
-    size = float(np.abs(a.positions).max()) or approach
-    point = size * rng.uniform(1.2, 1.5, 2)
-    low = -2.0 * approach
-
-    def grown(height: float) -> cr.Scene:
-        points, heights = np.vstack((a.positions, point)), np.append(a.heights, height)
-        radii = np.append(a.tip_radii, np.median(a.tip_radii))
-        return replace(scene, asperities=cr.Asperities(points, radii, heights))
-
-    gap = cr.press(grown(low), approach=approach).gaps[-1]
+    a, low = scene.asperities, -2.0 * approach
+    point = (float(np.abs(a.positions).max()) or approach) * rng.uniform(1.2, 1.5, 2)
+    tip = float(np.median(a.tip_radii))
+    gap = cr.press(_grown(scene, point, tip, low), approach=approach).gaps[-1]
     off = rng.choice([-1, 1]) * 10.0 ** rng.uniform(-17, -6) * approach
-    return grown(float(low + gap + off))
+    return _grown(scene, point, tip, float(low + gap + off))
 
 
 def audit(seeds: Iterator[int] | range) -> Tally:
@@ -199,17 +198,13 @@ def _audit_shear(
         forces = exact.forces if exact else [FRICTION * p for p in full.loads]
     state, cycle = cr.shear(contact, force=force), cr.cycle(contact, maximum=force)
     vector = cr.shear_vector(_with_poisson(contact, 0.0), force=force)
-    for stage, statuses in (
-        ("shear", state.status),
-        ("cycle", cycle.status),
-        ("vector", vector.status),
-    ):
-        for i, (status, load) in enumerate(zip(statuses, full.loads, strict=True)):
+    for stage, found in (("shear", state), ("cycle", cycle), ("vector", vector)):
+        for i, (status, load) in enumerate(zip(found.status, full.loads, strict=True)):
             slides = exact is None or exact.slips[i] > 0
             require(status != "sliding" or (load > 0 and slides), f"{stage}: sliding of {i}")
             require(status != "partial" or (load > 0 and not slides), f"{stage}: partial of {i}")
             require(status != "open" or not load > 0, f"{stage}: open of {i}")
-        tally.count(kind if fraction < 1 else "limit", operator, stage, statuses)
+        tally.count(kind if fraction < 1 else "limit", operator, stage, found.status)
     proof = state.certificate
     tally.compare(operator, "force", proof.force_errors, state.forces, forces)
     errors = vector.certificate.force_errors
@@ -235,18 +230,13 @@ def _audit_history(
         except Dragged:
             return
         assert inner is not None  # below the force that is
-        rises = [
-            there.displacement,
-            there.displacement - 2 * inner.displacement,
-            there.displacement,
-            -there.displacement,
-        ]
+        far = there.displacement
+        rises = [far, far - 2 * inner.displacement, far, -far]
         once, back = there.energy / 4, inner.energy / 2
         losses = [once, once + back, once + 2 * back, once + 2 * back + there.energy / 2]
         forces = there.forces - 2 * inner.forces
-    tally.compare(
-        operator, "past displacement", past.displacement_errors, past.displacements, rises
-    )
+    errors = past.displacement_errors
+    tally.compare(operator, "past displacement", errors, past.displacements, rises)
     tally.compare(operator, "past loss", past.loss_errors, past.losses, losses)
     one, other = (cr.shear(contact, force=Q).certificate for Q in (force, 0.625 * force))
     errors = one.force_errors + 2 * other.force_errors + 1e-14 * abs(force)
@@ -286,22 +276,17 @@ def audit_vectors(
     touching = [i for i, load in enumerate(full.loads) if load > 0]
     for i, slides in zip(touching, true.sliding, strict=True):
         require(state.status[i] != ("partial" if slides else "sliding"), f"tensor: status of {i}")
-    nu = arb(tilted.scene.material.poisson_ratio)
+    nu, proof = arb(tilted.scene.material.poisson_ratio), state.certificate
     with ctx.workdps(DIGITS + 30):
-        travel = travel_of(arb(FRICTION), nu)
-        forces, slips, displacement = (
-            FRICTION * true.forces,
-            travel * true.slips,
-            travel * true.displacement,
-        )
-    proof = state.certificate
+        travel, forces = travel_of(arb(FRICTION), nu), FRICTION * true.forces
+        slips, far = travel * true.slips, [travel * true.displacement]
     errors = proof.force_errors[touching]
     tally.compare(operator, "tensor force", errors, state.forces[touching], forces)
     if np.isfinite(state.displacement).all():
         errors = proof.slip_errors[touching]
         tally.compare(operator, "tensor slip", errors, state.slips[touching], slips)
         errors = [proof.displacement_error]
-        tally.compare(operator, "tensor displacement", errors, [state.displacement], [displacement])
+        tally.compare(operator, "tensor displacement", errors, [state.displacement], far)
 
 
 def _with_poisson(contact: cr.Contact, nu: float) -> cr.Contact:

@@ -2,15 +2,15 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from scenes import MATERIAL, hexagonal
 
 import convexrough as cr
 from convexrough.friction import order
 from convexrough.friction.levels import FrictionLevels
-
-MATERIAL = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
 
 
 def test_no_onset_where_an_indentation_falls() -> None:
@@ -22,11 +22,8 @@ def test_no_onset_where_an_indentation_falls() -> None:
         cr.onset_gradient(contact, 0)
 
 
-def test_gradients_of_losses_have_bounds_only_where_order_is_proved(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    asperities = cr.Asperities.hexagonal(spacing=0.002, tip_radius=0.02, within=0.0102)
-    contact = cr.press(cr.Scene(1.0, asperities, MATERIAL, 0.5), approach=5e-5)
+def test_gradients_of_losses_have_bounds_only_where_order_is_proved(monkeypatch: Any) -> None:
+    contact = cr.press(replace(hexagonal(spacing=0.002), friction=0.5), approach=5e-5)
     monkeypatch.setattr(order, "INVERTED", 0)
     monkeypatch.setattr(order, "SWEPT", 1)
     monkeypatch.setattr(FrictionLevels.order, "__defaults__", (0,))

@@ -66,32 +66,25 @@ class VectorMap:
         across = np.array([[arb(1), arb(0)], [arb(0), arb(1)]]) - along
         return size / length * eta, slope * along + size / length * across
 
+    def forces(self, x: Balls) -> tuple[Balls, Balls]:
+        """q (n, 2) and their derivatives (n, 2, 2)."""
+        pairs = [self.force(i, eta) for i, eta in enumerate(x[:-2].reshape(-1, 2))]
+        q, slopes = (np.array(each) for each in zip(*pairs, strict=True))
+        return q, slopes
+
     def residual(self, x: Balls) -> Balls:
-        return self._evaluate(x)[0]
+        q, n = self.forces(x)[0], len(self.loads)
+        moved = x[:-2] + self.kernel @ q.reshape(-1) - np.tile(x[-2:], n)
+        return np.append(moved, self.unit * (q.sum(axis=0) - self.total))
 
     def jacobian(self, x: Balls) -> Balls:
-        return self._evaluate(x)[1]
-
-    def _evaluate(self, x: Balls) -> tuple[Balls, Balls]:
-        """F and its derivative."""
-        n = len(self.loads)
-        eta, displacement = x[:-2], x[-2:]
-        pairs = [self.force(i, eta[2 * i : 2 * i + 2]) for i in range(n)]
-        q = np.concatenate([force for force, _ in pairs])
-        stiff = np.full((2 * n, 2 * n), arb(0))
-        for i, (_, slope) in enumerate(pairs):
+        n, slopes = len(self.loads), self.forces(x)[1]
+        stiff, together = np.full((2 * n, 2 * n), arb(0)), exact(np.tile(np.eye(2), (n, 1)))
+        for i, slope in enumerate(slopes):
             stiff[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = slope
-        missing = q.reshape(-1, 2).sum(axis=0) - self.total
-        value = np.concatenate(
-            (eta + self.kernel @ q - np.tile(displacement, n), self.unit * missing)
-        )
-        jacobian = np.full((2 * n + 2, 2 * n + 2), arb(0))
-        jacobian[:-2, :-2] = self.kernel @ stiff
-        for k in range(2 * n):
-            jacobian[k, k] += 1
-            jacobian[k, 2 * n + k % 2] = arb(-1)
-            jacobian[2 * n + k % 2, :-2] += self.unit * stiff[k]
-        return value, jacobian
+        own = self.kernel @ stiff + exact(np.eye(2 * n))
+        balance = self.unit * (together.T @ stiff)
+        return np.block([[own, -together], [balance, np.full((2, 2), arb(0))]])
 
 
 def solve_vectors(
@@ -144,24 +137,18 @@ def _near_the_limit(P: Balls, kernel: Balls, total: Balls) -> Balls:
 
 def tangential_kernel(points: Balls, influence: Balls, bias: Any) -> Balls:
     """(2n, 2n) A_ij [(1 - bias) I + 2 bias d d']."""
-    n = len(points)
-    kernel = np.full((2 * n, 2 * n), arb(0))
-    for i in range(n):
-        for j in range(n):
-            if i != j:
-                d = points[i] - points[j]
-                block = 2 * bias * np.outer(d, d) / (d @ d)
-                block[0, 0] += 1 - bias
-                block[1, 1] += 1 - bias
-                kernel[2 * i : 2 * i + 2, 2 * j : 2 * j + 2] = influence[i, j] * block
-    return kernel
+    d = points[:, None] - points
+    squares = (d * d).sum(axis=2)
+    np.fill_diagonal(squares, arb(1))  # where A is 0
+    along = 2 * bias * d[..., None] * d[..., None, :] / squares[..., None, None]
+    blocks = influence[..., None, None] * (along + (1 - bias) * exact(np.eye(2)))
+    return blocks.transpose(0, 2, 1, 3).reshape(2 * len(points), -1)
 
 
 def _state(problem: VectorMap, x: Balls) -> VectorReference:
     eta = x[:-2].reshape(-1, 2)
-    forces = np.array([problem.force(i, each)[0] for i, each in enumerate(eta)])
-    lengths = [(each @ each).sqrt() for each in eta]
-    sliding = [bool(a > k) for a, k in zip(lengths, problem.thresholds, strict=True)]
-    beyond = [1 - k / a for a, k in zip(lengths, problem.thresholds, strict=True)]
-    slips = np.where(np.array(sliding)[:, None], np.array(beyond)[:, None] * eta, arb(0))
-    return VectorReference(forces, slips, x[-2:], sliding)
+    lengths = np.sqrt((eta * eta).sum(axis=1))
+    sliding = lengths > problem.thresholds
+    beyond = 1 - problem.thresholds / lengths
+    slips = np.where(sliding[:, None], beyond[:, None] * eta, arb(0))
+    return VectorReference(problem.forces(x)[0], slips, x[-2:], sliding.tolist())

@@ -15,7 +15,7 @@ import convexrough as cr
 @pytest.mark.parametrize("radius", [0.7, 1.3])
 def test_the_duality_gap_where_heights_cancel_drops(radius: float) -> None:
     """Summits on a bowl: the indentation of 1e-12 is a difference of numbers near 10."""
-    points = 3.0 * np.array([[i, j] for i in (-1, 0, 1) for j in (-1, 0, 1)])
+    points = 3.0 * (np.indices((3, 3)).reshape(2, -1).T - 1)
     scene = on_sphere(points, 1.0, (points**2).sum(axis=1) / (2 * radius), radius)
     contact = cr.press(scene, approach=1e-12, influence="lattice")
     exact = reference(scene, approach=1e-12)

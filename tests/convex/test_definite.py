@@ -5,12 +5,10 @@ import pytest
 from flint import fmpq, fmpq_mat
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from convexrough.arrays import Array
 from convexrough.convex.definite import is_definite, proved_margin
 from convexrough.roundoff import ROUNDOFF
-
-Array = NDArray[np.float64]
 
 
 def proves_margin(couplings: Array, margin: float, entry_error: float) -> bool:
@@ -24,13 +22,8 @@ def exact(value: float) -> fmpq:
 def above(couplings: Array, margin: fmpq) -> bool:
     """Whether I + M > margin I, by the signs of all leading minors: no rounding."""
     n = len(couplings)
-    shifted = fmpq_mat(
-        [[1 - margin if i == j else exact(couplings[i, j]) for j in range(n)] for i in range(n)]
-    )
-    minors = (
-        fmpq_mat([[shifted[i, j] for j in range(m)] for i in range(m)]).det()
-        for m in range(1, n + 1)
-    )
+    shifted = np.vectorize(exact, otypes=[object])(couplings) + (1 - margin) * np.eye(n, dtype=int)
+    minors = (fmpq_mat(shifted[:m, :m].tolist()).det() for m in range(1, n + 1))
     return all(minor > 0 for minor in minors)
 
 

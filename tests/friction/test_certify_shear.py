@@ -14,13 +14,17 @@ from scenes import paper, twins
 import convexrough as cr
 
 
-def spoiled(forces: Any, limits: Any, kind: str, rng: np.random.Generator) -> Any:
+def spoiled(contact: cr.Contact, force: float, kind: str, seed: int) -> Any:
     """Forces with something wrong; "full" are the largest that friction bears."""
-    return limits if kind == "full" else rng.choice([1, 1, -1]) * attack(kind, forces, rng)
+    if kind == "full":
+        return FRICTION * contact.loads
+    rng = np.random.default_rng(seed)
+    return rng.choice([1, 1, -1]) * attack(kind, cr.shear(contact, force=force).forces, rng)
 
 
-def assert_covers(judged: cr.ShearCertificate, forces: Any, truth: Any) -> None:
+def assert_covers(judged: cr.ShearCertificate, forces: Any, name: str, fraction: float) -> None:
     """No bound is too small and no status is wrong, by 80 digits."""
+    truth = exact(name, fraction)
     assert (off(forces, truth.forces) <= judged.force_errors).all()
     assert (judged.status != np.where(truth.slips > 0, "partial", "sliding")).all()
     assert not (truth.loads > 0)[judged.status == "open"].any()
@@ -37,13 +41,8 @@ def assert_covers(judged: cr.ShearCertificate, forces: Any, truth: Any) -> None:
 def test_attacks(name: str, fraction: float, kind: str, seed: int, influence: Any) -> None:
     contact = pressed(name, influence)
     force = fraction * FRICTION * contact.load
-    forces = spoiled(
-        cr.shear(contact, force=force).forces,
-        FRICTION * contact.loads,
-        kind,
-        np.random.default_rng(seed),
-    )
-    assert_covers(cr.certify_shear(contact, forces, force=force), forces, exact(name, fraction))
+    forces = spoiled(contact, force, kind, seed)
+    assert_covers(cr.certify_shear(contact, forces, force=force), forces, name, fraction)
 
 
 @pytest.mark.sample(3)
@@ -51,16 +50,11 @@ def test_attacks(name: str, fraction: float, kind: str, seed: int, influence: An
 @pytest.mark.parametrize("fraction", [0.1, 0.37, 0.999])
 @pytest.mark.parametrize("kind", ["rounded", "perturbed", "dropped", "full"])
 def test_doubt_about_the_loads_is_counted(kind: str, fraction: float, digits: int) -> None:
-    contact, truth = pressed("paper"), exact("paper", fraction)
+    contact = pressed("paper")
     force = fraction * FRICTION * contact.load
-    forces = spoiled(
-        cr.shear(contact, force=force).forces,
-        FRICTION * contact.loads,
-        kind,
-        np.random.default_rng(digits),
-    )
-    judged = cr.certify_shear(in_doubt(contact, digits, "approach"), forces, force=force)
-    assert_covers(judged, forces, truth)
+    forces = spoiled(contact, force, kind, digits)
+    judged = cr.certify_shear(in_doubt(contact, digits), forces, force=force)
+    assert_covers(judged, forces, "paper", fraction)
 
 
 def test_where_nothing_touches() -> None:

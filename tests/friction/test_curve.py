@@ -1,6 +1,7 @@
 """The memory curve: exact plane geometry, without any elasticity."""
 
 from fractions import Fraction
+from itertools import pairwise
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -55,13 +56,11 @@ def _cubic(piece: object) -> Fraction:
 
 @given(paths, st.lists(st.fractions(0, 1), max_size=3))
 def test_splitting_segments_changes_nothing(path: list[Point], cuts: list[Fraction]) -> None:
-    split: list[Point] = []
-    here: Point = (Fraction(0), Fraction(0))
-    for target in path:
-        for part in sorted(cuts):
-            split.append(tuple(a + part * (b - a) for a, b in zip(here, target, strict=True)))  # type: ignore[arg-type]
-        split.append(target)
-        here = target
+    split = [
+        (P + part * (to_P - P), T + part * (to_T - T))
+        for (P, T), (to_P, to_T) in pairwise([(Fraction(0), Fraction(0)), *path])
+        for part in (*sorted(cuts), 1)
+    ]
     assert shape(after(split)) == shape(after(path))
     assert loss(split) == loss(path)
 

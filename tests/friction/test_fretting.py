@@ -1,12 +1,9 @@
 """Fretting: tractions against the field, slip against the energy that it costs."""
 
-import dataclasses
-from functools import cache
-
 import numpy as np
 import pytest
+from friction_scenes import pressed
 from numpy.testing import assert_array_equal
-from scenes import PAPER_APPROACH, paper, rough
 
 import convexrough as cr
 from convexrough import fields
@@ -14,28 +11,23 @@ from convexrough.friction.fretting import rim_gap
 from convexrough.sphere import mindlin
 
 
-@cache
-def contact(name: str) -> cr.Contact:
-    scene = {"paper": paper, "rough": rough}[name]()
-    return cr.press(dataclasses.replace(scene, friction=0.5), approach=PAPER_APPROACH)
-
-
-def worn(name: str, high: float, low: float) -> tuple[cr.Cycle, cr.Fretting]:
-    limit = 0.5 * contact(name).load
-    cycle = cr.cycle(contact(name), maximum=high * limit, minimum=low * limit)
+def worn(high: float, low: float) -> tuple[cr.Cycle, cr.Fretting]:
+    contact = pressed("rough")
+    limit = 0.5 * contact.load
+    cycle = cr.cycle(contact, maximum=high * limit, minimum=low * limit)
     return cycle, cr.fretting(cycle)
 
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize(("high", "low"), [(0.3, -0.3), (0.6, -0.6), (0.2, -0.7), (0.8, 0.1)])
 def test_tractions_are_those_of_the_field(high: float, low: float) -> None:
-    _, found = worn("rough", high, low)
-    pressed = found.contact
-    state = cr.shear(pressed, force=max(high, low, key=abs) * 0.5 * pressed.load)
-    for i in np.flatnonzero(pressed.loads)[::6]:
-        a = pressed.contact_radii[i]
+    _, found = worn(high, low)
+    contact = found.contact
+    state = cr.shear(contact, force=max(high, low, key=abs) * 0.5 * contact.load)
+    for i in np.flatnonzero(contact.loads)[::6]:
+        a = contact.contact_radii[i]
         r = np.sort(np.append(np.linspace(0.0, a, 20_001), state.stick_radii[i]))
-        points = pressed.scene.contact_points[i] + np.column_stack((r, 0.0 * r))
+        points = contact.scene.contact_points[i] + np.column_stack((r, 0.0 * r))
         q = np.abs(fields.traction(state, points))
         assert found.largest_tractions[i] == pytest.approx(q.max(), rel=1e-7)
         if 0 < state.stick_radii[i] < a:
@@ -46,10 +38,10 @@ def test_tractions_are_those_of_the_field(high: float, low: float) -> None:
 
 def test_progress_on_a_long_path_is_told(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level("INFO", logger="convexrough")
-    P = contact("paper").load
+    P = pressed("paper").load
     ellipse = {"load": P, "load_amplitude": 0.4 * P, "force_amplitude": 0.2 * P, "friction": 0.5}
     loads, forces = cr.elliptic_path(**ellipse, chords=24)
-    cr.fretting(cr.steady(contact("paper").scene, loads=loads, forces=forces))
+    cr.fretting(cr.steady(pressed("paper").scene, loads=loads, forces=forces))
     assert any(said.startswith("normal problems 1 to ") for said in caplog.messages)
     assert f"tractions at point {len(loads)} of {len(loads)}" in caplog.messages
 
@@ -58,7 +50,7 @@ def test_progress_on_a_long_path_is_told(caplog: pytest.LogCaptureFixture) -> No
 @pytest.mark.parametrize(("high", "low"), [(0.3, -0.3), (0.6, -0.6), (0.8, 0.1)])
 def test_slip_against_friction_costs_the_energy(high: float, low: float) -> None:
     """Each asperity loses 4 times the integral of f p times the amplitude of slip."""
-    cycle, found = worn("rough", high, low)
+    cycle, found = worn(high, low)
     scene, f = cycle.scene, 0.5
     c_t = float(mindlin.ratio(scene.material.poisson_ratio))
     for i in np.flatnonzero(cycle.contact.loads)[::6]:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
-from scenes import MATERIAL, NAMED
+from scenes import NAMED, on_sphere
 
 import convexrough as cr
 from convexrough import rows
@@ -16,19 +16,15 @@ PAPER = replace(NAMED["paper"][0], friction=F)
 
 
 def rough(count: int, *, tips: float = 0.0, geometry: Any = "summit") -> list[cr.Scene]:
-    sampled = [
-        PAPER.asperities.roughened(height_std=1e-6, tip_radius_cv=tips, seed=k)
-        for k in range(count)
-    ]
+    flat, spread = PAPER.asperities, {"height_std": 1e-6, "tip_radius_cv": tips}
+    sampled = [flat.roughened(**spread, seed=k) for k in range(count)]
     return [replace(PAPER, asperities=each, geometry=geometry) for each in sampled]
 
 
 def scattered(count: int) -> list[cr.Scene]:
-    rng = np.random.default_rng(5)
-    x, y = np.meshgrid(np.arange(-4, 5), np.arange(-4, 5))
-    grid = 0.0026 * np.column_stack((x.ravel(), y.ravel()))
+    rng, grid = np.random.default_rng(5), 0.0026 * (np.indices((9, 9)).reshape(2, -1).T - 4)
     places = [grid + rng.uniform(-2e-4, 2e-4, grid.shape) for _ in range(count)]
-    return [cr.Scene(1.0, cr.Asperities(each, 0.02), MATERIAL, F) for each in places]
+    return [on_sphere(each, friction=F) for each in places]
 
 
 BASES: list[Any] = [1.0, 2.0, (1.0, 1.5)]
@@ -111,8 +107,7 @@ def test_warnings_of_many() -> None:
 
 def test_more_problems_than_a_chunk_of_numbers() -> None:
     """Two asperities each, so that one stack has more than 2^14 rows."""
-    pair = cr.Asperities([[0.0, 0.0], [2.5e-3, 0.0]], 0.02)
-    scene = cr.Scene(1.0, pair, cr.Material(contact_modulus=1.0, poisson_ratio=0.3))
+    scene = on_sphere([[0.0, 0.0], [2.5e-3, 0.0]])
     loads = np.linspace(1e-8, 3e-7, 2**14 + 16)
     found = cr.press_many([scene] * len(loads), load=loads)
     np.testing.assert_allclose(found.asperity_loads.sum(axis=1), loads, rtol=1e-12)

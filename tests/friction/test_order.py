@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from levels_reference import SCENES
+from friction_scenes import SCENES
 from path_scenes import around, on_flat, shaded
+from scenes import on_sphere
 
 import convexrough as cr
 from convexrough.bench.scenes import scene as bench_scene
@@ -176,13 +177,11 @@ def test_order_is_proved_when_asked(monkeypatch: pytest.MonkeyPatch) -> None:
 )  # fmt: skip
 def test_order_on_lattices_of_other_shapes(first: Any, second: Any, approach: float) -> None:
     """Rims are not at right angles to the direction from the middle, and lines have no width."""
-    i, j = (
-        np.meshgrid(np.arange(-40, 41), np.arange(-20, 21)) if second else (np.arange(-250, 251), 0)
-    )
-    places = np.multiply.outer(i, first) + np.multiply.outer(j, second or (0, 0))
-    asperities = cr.Asperities(0.0025 * places.reshape(-1, 2), 0.02)
+    places = np.multiply.outer(np.arange(-250, 251), first)
+    if second:
+        places = places[210:291, None] + np.multiply.outer(np.arange(-20, 21), second)
     radius = 40.0 if second else 600.0
-    scene = cr.Scene(radius, asperities, cr.Material(1.0, 0.3), friction=0.5, geometry="summit")
+    scene = on_sphere(0.0025 * places.reshape(-1, 2), radius=radius, friction=0.5)
     contact = cr.press(scene, approach=approach)
     levels = levels_of(contact)
     assert 0.3 < contact.crowding < 1.3

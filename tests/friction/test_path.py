@@ -7,10 +7,10 @@ from path_scenes import LARGEST, ONE, TWO, follow, path_of
 
 import convexrough as cr
 
-#: (scene, path): after each point X, W, front over the largest load, how many slide of how many
-#: touch. Prototypes: bristles, and a step per asperity.
+#: On the paper's scene after each point: X, W, front over the largest load, how many slide and
+#: how many touch. Prototypes: bristles, and a step per asperity.
 VALUES = {
-    ("paper", "one"): [
+    "one": [
         (0, 0, None, 0, 31),
         (7.3276448474924e-06, 2.3814820748506e-14, 0.3, 12, 31),
         (7.3276448474924e-06, 2.3814820748506e-14, None, 0, 37),
@@ -19,7 +19,7 @@ VALUES = {
         (4.7938665937403e-06, 9.1658880935531e-14, 0.525, 6, 37),
         (2.7969942282077e-06, 9.2975537297004e-14, 0.475, 0, 31),
     ],
-    ("paper", "two"): [
+    "two": [
         (1.5178571428571e-05, 0, None, 0, 37),
         (-4.6663907908195e-06, 9.7302648312866e-14, 0.2 / 3, 6, 19),
         (7.4348708668891e-06, 9.7302648312866e-14, None, 0, 37),
@@ -40,29 +40,26 @@ FORCES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(("name", "which"), VALUES)
-def test_values_of_the_prototypes(name: str, which: str) -> None:
-    path = follow(name, POINTS[which])
+@pytest.mark.parametrize("which", VALUES)
+def test_values_of_the_prototypes(which: str) -> None:
+    path, largest = follow("paper", POINTS[which]), LARGEST["paper"]
     touching = (path.status != "open").sum(axis=1)
     sliding = (path.status == "sliding").sum(axis=1)
-    for k, (X, W, front, slide, touch) in enumerate(VALUES[name, which]):
+    for k, (X, W, front, slide, touch) in enumerate(VALUES[which]):
         assert path.displacements[k] == pytest.approx(X, rel=1e-12, abs=1e-19)
         assert path.losses[k] == pytest.approx(W, rel=1e-11, abs=1e-28)
-        assert path.fronts[k] / LARGEST[name] == pytest.approx(front or np.nan, nan_ok=True)
-        if touch is not None:
-            assert (sliding[k], touching[k]) == (slide, touch)
+        assert path.fronts[k] / largest == pytest.approx(front or np.nan, nan_ok=True)
+        assert (sliding[k], touching[k]) == (slide, touch)
     assert not (path.status == "undecided").any()
     assert path.order == "proved"
     assert path.presses <= 3 * len(path.loads)
     # How well it is proved.
-    assert (path.asperity_force_errors < 1e-13 * LARGEST[name]).all()
+    assert (path.asperity_force_errors < 1e-13 * largest).all()
     assert (path.displacement_errors < 2e-12 * np.abs(path.displacements).max()).all()
     assert (path.loss_errors < 1e-10 * path.losses[-1]).all()
     assert (path.displacement_errors[1:] > 0).all()
-    if name == "paper":
-        assert_allclose(
-            path.asperity_forces[3, RING] / (0.5 * LARGEST[name]), FORCES[which], rtol=1e-11
-        )
+    shares = path.asperity_forces[3, RING] / (0.5 * largest)
+    assert_allclose(shares, FORCES[which], rtol=1e-11)
 
 
 @pytest.mark.parametrize("name", ["paper", "rough"])
@@ -74,11 +71,8 @@ def test_constant_load_is_a_history(name: str) -> None:
     loaded = contact.loads > 0
     assert_allclose(path.displacements, past.displacements, rtol=1e-13, atol=1e-18)
     assert_allclose(path.asperity_forces, past.asperity_forces, atol=1e-13 * Q.max())
-    assert_allclose(
-        path.asperity_displacements[:, loaded],
-        past.asperity_displacements[:, loaded],
-        atol=1e-13 * np.abs(past.displacements).max(),
-    )
+    own, theirs = (each.asperity_displacements[:, loaded] for each in (path, past))
+    assert_allclose(own, theirs, atol=1e-13 * np.abs(past.displacements).max())
     assert_allclose(path.losses, past.losses, rtol=1e-12)
     difference = np.abs(path.displacements - past.displacements)
     assert (difference <= path.displacement_errors + past.displacement_errors).all()

@@ -48,6 +48,7 @@ BAD = [
     (lambda: cr.cycle(CONTACT, maximum=0.1 * LIMIT, minimum=0.2 * LIMIT),
      r"maximum\[0\].*at least the minimum"),
     (lambda: cr.history(CONTACT, forces=[0.0, -2 * LIMIT]), r"forces\[1\].*gross sliding"),
+    (lambda: cr.cycle(CONTACT, maximum=LIMIT).loop(10**15), r"points: found 1e\+15 levels \("),
     # Vector friction.
     (lambda: cr.shear_vector(CONTACT, force=1.01 * LIMIT), r"found .*\(1\.01 f P: gross sliding\)"),
     (lambda: cr.shear_vector(CONTACT, force=(LIMIT, 0.2 * LIMIT)), r"\(1\.0\d+ f P: gross slid"),

@@ -52,7 +52,6 @@ def test_zero_and_the_limit() -> None:
     nearly = cr.shear(contact, force=limit * (1 - 1e-12))
     assert_allclose(nearly.forces, FRICTION * contact.loads, rtol=1e-9)
     assert nearly.displacement < gross.displacement
-    back = cr.shear(contact, force=-0.3 * limit)
-    forth = cr.shear(contact, force=0.3 * limit)
+    back, forth = (cr.shear(contact, force=sign * 0.3 * limit) for sign in (-1, 1))
     assert (back.forces == -forth.forces).all()
     assert back.displacement == -forth.displacement

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 from flint import arb, ctx
-from friction_scenes import FRICTION, with_friction
+from friction_scenes import FRICTION, SCENES, pressed, with_friction
 from gradient_oracle import DIGITS, STEP, Setup, assert_close, exact, known
-from levels_reference import SCENES, Holding, of_setup, pressed
-from scenes import hexagonal, paper
+from levels_reference import of_setup
+from scenes import OPERATORS, hexagonal, paper, stepped
 
 import convexrough as cr
 
@@ -24,7 +24,7 @@ NAMES = ("heights", "tip_radii", "positions", "sphere_radius", "contact_modulus"
 
 
 def assert_both(
-    contact: cr.Contact, force: float, holding: Holding, sharp: float, seed: int = 0
+    contact: cr.Contact, force: float, holding: Any, sharp: float, seed: int = 0
 ) -> None:
     """Values and derivatives, of arrays along random signs and by two entries, and their bounds."""
     loss = cr.cycle(contact, maximum=force).gradient(holding=holding)
@@ -58,15 +58,15 @@ def assert_both(
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("fraction", [1e-2, 0.4, 0.999])
 @pytest.mark.parametrize("holding", ["load", "approach"])
-def test_every_derivative(name: str, fraction: float, holding: Holding) -> None:
-    contact = pressed(name, holding)
+def test_every_derivative(name: str, fraction: float, holding: str) -> None:
+    contact = pressed(name, control=holding)
     assert_both(contact, fraction * FRICTION * contact.load, holding, SHARP)
 
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("fraction", [1e-9, 1e-6, 1e-4, 1 - 1e-7])
 def test_bounds_are_honest_where_they_are_not_sharp(fraction: float) -> None:
-    contact = pressed("rough", "load")
+    contact = pressed("rough", control="load")
     assert_both(contact, fraction * FRICTION * contact.load, "load", 0.0)
 
 
@@ -95,7 +95,7 @@ def test_no_bound_is_too_small(seed: int) -> None:
     contact = cr.press(scene, approach=approach)
     if contact.certificate.scope == "none":
         return
-    holding: Holding = "approach"
+    holding = "approach"
     if rng.uniform() < 0.5:
         contact, holding = cr.press(scene, load=contact.load), "load"
     fraction = float(rng.choice([1e-3, 0.1, 0.9, rng.uniform()]))
@@ -104,7 +104,7 @@ def test_no_bound_is_too_small(seed: int) -> None:
 
 
 def test_gross_sliding_from_one_side() -> None:
-    contact = pressed("rough", "load")
+    contact = pressed("rough", control="load")
     force = FRICTION * contact.load
     gradient = cr.cycle(contact, maximum=force).gradient()
     assert (gradient.maximum, gradient.load, gradient.friction) == (np.inf, -np.inf, -np.inf)
@@ -115,19 +115,15 @@ def test_gross_sliding_from_one_side() -> None:
     top = contact.gradient(approach=1.0).heights
     unit = 2.0 * gradient.poisson_ratio / gradient.value  # c_t by its derivative, and f
     assert unit > 0
-    first = int(np.argmax(contact.scene.offsets))
+    first = np.arange(len(top)) == np.argmax(contact.scene.offsets)
     ratio = (2 - 0.3) / (2 * 0.7) * FRICTION
-    expected = ratio * top
-    expected[first] += ratio
-    np.testing.assert_allclose(moved.heights, expected, rtol=1e-14)
+    np.testing.assert_allclose(moved.heights, ratio * (top + first), rtol=1e-14)
 
 
 def test_many_asperities_by_every_operator() -> None:
     scene = with_friction(hexagonal(2.5e-4, 2e-3, 2.5e-3, height_std=3e-8, seed=1))
-    found = {}
-    for kind in ("dense", "lattice", "scattered"):
-        contact = cr.press(scene, load=1e-8, influence=kind)  # type: ignore[arg-type]
-        found[kind] = cr.cycle(contact, maximum=0.2 * contact.load).gradient()
+    contacts = {kind: cr.press(scene, load=1e-8, influence=kind) for kind in OPERATORS}
+    found = {kind: cr.cycle(each, maximum=2e-9).gradient() for kind, each in contacts.items()}
     for kind, each in found.items():
         for name in ("heights", "tip_radii", "positions", "sphere_radius", "contact_modulus"):
             values, errors = known(each, name)
@@ -142,21 +138,17 @@ def test_many_asperities_by_every_operator() -> None:
 @pytest.mark.parametrize("name", ["rough", "rough, closest"])
 def test_normalised(name: str, holding: Any) -> None:
     """Against differences of W / W0 in float64, by everything at once."""
-    contact = pressed(name, holding)
+    contact = pressed(name, control=holding)
     force = 0.3 * contact.load
     gradient = cr.cycle(contact, maximum=force).gradient().normalised
     scene, rng = contact.scene, np.random.default_rng(2)
-    a, E = scene.asperities, scene.material.contact_modulus
-    steps = {
-        "heights": 1e-8 * rng.normal(size=len(a)),
-        "positions": 1e-4 * rng.normal(size=(len(a), 2)),
-    }
-    steps |= {"tip_radii": a.tip_radii * rng.normal(size=len(a))}
+    n, E = len(scene), scene.material.contact_modulus
+    steps = {"heights": 1e-8 * rng.normal(size=n), "positions": 1e-4 * rng.normal(size=(n, 2))}
+    steps["tip_radii"] = scene.asperities.tip_radii * rng.normal(size=n)
 
     def normalised(h: float) -> float:
-        moved = replace(a, **{name: getattr(a, name) + h * steps[name] for name in steps})
         material, radius = cr.Material(E + 0.4 * h, 0.3), scene.sphere_radius + 0.7 * h
-        there = cr.Scene(radius, moved, material, FRICTION, scene.geometry)
+        there = replace(stepped(scene, h, steps), material=material, sphere_radius=radius)
         pressed = cr.press(there, **{holding: getattr(contact, holding)})
         return cr.cycle(pressed, maximum=force).loss_normalised
 

@@ -41,16 +41,13 @@ def test_its_gradient(name: str) -> None:
     objective = OBJECTIVES[name]
     x, rng = objective.start, np.random.default_rng(1)
     value, slopes = objective(x)
-    done = 0
-    for each in objective.by:
-        size = np.size(objective._own(each))
-        v, part = np.zeros(len(x)), slice(done, done + size)
-        scale = 5e-5 if each == "heights" else np.abs(x[part]).max()
-        v[part] = scale * rng.choice([-1.0, 1.0], size=size)
+    ends = np.cumsum([np.size(objective._own(each)) for each in objective.by])
+    assert ends[-1] == len(x)
+    for each, part in zip(objective.by, np.split(np.arange(len(x)), ends[:-1]), strict=True):
+        v, scale = np.zeros(len(x)), 5e-5 if each == "heights" else np.abs(x[part]).max()
+        v[part] = scale * rng.choice([-1.0, 1.0], size=len(part))
         found = differences(lambda y: objective(y)[0], x, v, 1e-6)
         assert found == pytest.approx(slopes @ v, rel=1e-5, abs=1e-9 * abs(value)), each
-        done += size
-    assert done == len(x)
 
 
 @pytest.mark.parametrize("package", ["jax", "torch", "autograd"])

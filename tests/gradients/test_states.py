@@ -13,6 +13,7 @@ from flint import arb, ctx
 from friction_scenes import FRICTION, with_friction
 from gradient_oracle import (
     DIGITS,
+    STEP,
     Judge,
     Oracle,
     Setup,
@@ -23,6 +24,7 @@ from gradient_oracle import (
     press,
 )
 from levels_reference import Level, of_setup
+from multiprecision import travel_of
 from path_scenes import shaded
 from scenes import hexagonal
 
@@ -42,21 +44,14 @@ def small(geometry: Any = "summit", holding: str = "load", within: float = 0.005
     return contact if holding == "approach" else cr.press(scene, load=contact.load)
 
 
-def of_contact(contact: cr.Contact, holding: str, number: Callable[[Any], Any]) -> Judge:
+def judge_of(number: Callable[[Any], Any], contact: cr.Contact, holding: str, *force: float) -> Any:
+    """Of a number of the contact, or of its state under a shear force."""
+
     def value(setup: Setup, near: Any) -> tuple[Any, Any]:
-        oracle = press(contact, setup, near)
-        return number(oracle), oracle
+        make = of_setup(setup, contact, near) if force else press(contact, setup, near)
+        return number(make), make
 
-    return Judge(Setup.of(contact, holding), value)
-
-
-def of_state(
-    contact: cr.Contact, holding: str, force: float, number: Callable[[Any], Any]
-) -> Judge:
-    def value(setup: Setup, _: Any) -> tuple[Any, Any]:
-        return number(of_setup(setup, contact)), None
-
-    return Judge(Setup.of(contact, holding, [force]), value)
+    return Judge(Setup.of(contact, holding, force), value)
 
 
 @pytest.mark.sample(2)
@@ -71,7 +66,7 @@ def test_any_sum_of_loads_and_gaps(geometry: str, holding: Any) -> None:
         return exact(loads) @ oracle.loads + exact(gaps) @ oracle.gaps
 
     gradient = contact.gradient(loads=loads, gaps=gaps)
-    judge = of_contact(contact, holding, number)
+    judge = judge_of(number, contact, holding)
     assert_slopes(judge, gradient, sharp=SHARP)
     assert abs(gradient.value - float(judge.at)) <= gradient.value_error * 1.01
     assert gradient.balance_defect < 1e-14
@@ -94,10 +89,9 @@ def test_any_sum_of_forces_and_slips(
     def number(state: Any) -> Any:
         return exact(forces) @ state.forces + exact(slips) @ state.slips
 
-    judge = of_state(contact, holding, force, number)
-    gradient = cr.shear(contact, force=sign * force).gradient(
-        forces=sign * forces, slips=sign * slips
-    )
+    judge = judge_of(number, contact, holding, force)
+    state = cr.shear(contact, force=sign * force)
+    gradient = state.gradient(forces=sign * forces, slips=sign * slips)
     assert_slopes(judge, gradient, sharp=SHARP)
     by_force, error = known(gradient, "force")
     assert_close(judge.difference("forces", exact([1.0])), sign * by_force, error, "force", SHARP)
@@ -112,26 +106,25 @@ def test_onset(holding: Any) -> None:
     onset = float(cr.onset_of_sliding(contact, which=[asperity])[0])
 
     def value(setup: Setup, near: Any) -> tuple[Any, Any]:
-        """The root in Q of the gap at L, by secants; it touches with no load in `near`."""
-        ends = []
-        for trial in (arb(onset) if near is None else near, None, None, None, None, None, None):
-            Q = trial
-            if Q is None:
-                (q0, m0), (q1, m1) = (
-                    ends[-2:] if len(ends) > 1 else ((onset * (1 - arb("1e-12")), None), ends[-1])
-                )
-                Q = q0 if m0 is None else (q1 - m1 * (q1 - q0) / (m1 - m0)).mid()
-            left = (press(contact, setup, None).P.sum() - Q / setup.friction).mid()
+        """The root in Q of the gap at L, by secants."""
+        total = press(contact, setup, None).P.sum()
+
+        def gap(Q: Any) -> Any:
+            left = (total - Q / setup.friction).mid()
             start = cr.press(contact.scene, load=float(left))
             loads = start.loads.copy()
             loads[asperity] = 0.0  # its own load counts for nothing there
             there = replace(setup, control=left, by_load=True)
             lower = Oracle(there, exact(loads), arb(start.approach), 7)
-            coupled = lower.A @ lower.loads
-            ends.append((Q, lower.approach + lower.offsets[asperity] - coupled[asperity]))
-            if abs(ends[-1][1]) < arb("1e-80"):
-                break
-        return ends[-1][0], ends[-1][0]
+            return lower.approach + lower.offsets[asperity] - lower.A[asperity] @ lower.loads
+
+        last, root = onset * (1 - arb("1e-12")), near or arb(onset)
+        before, here = gap(last), gap(root)
+        while abs(here) >= arb("1e-80"):
+            slope = (here - before) / (root - last)
+            last, before, root = root, here, (root - here / slope).mid()
+            here = gap(root)
+        return root, root
 
     judge = Judge(Setup.of(contact, holding), value)
     assert onset == pytest.approx(float(judge.at), rel=1e-13)
@@ -147,25 +140,19 @@ def walked(contact: cr.Contact, steps: Any, start: Any, weights: Any) -> Callabl
     """From loads and forces, rational, to losses and displacements, in many digits."""
 
     def value(setup: Setup, P: list[Fraction], Q: list[Fraction], f: Fraction) -> Any:
-        levels: dict[Fraction, tuple[Any, Any]] = {}
-
-        def at(load: Fraction) -> tuple[Any, Any]:
-            if load not in levels and load == 0:
-                highest = int(np.argmax(contact.scene.offsets))
-                rest = Level(setup, contact)
-                levels[load] = arb(0), -rest.offsets[highest]
-            if load not in levels:
-                wanted = arb(load.numerator) / arb(load.denominator)
-                near = near_to(contact.scene, float(load))
-                found = Level(replace(setup, control=wanted, by_load=True), near)
-                levels[load] = found.energy, found.approach
-            return levels[load]
-
         def number(each: Fraction) -> Any:
             return arb(each.numerator) / arb(each.denominator)
 
-        nu = setup.poisson_ratio
-        travel = (2 - nu) / (2 * (1 - nu)) * setup.friction
+        @cache
+        def at(load: Fraction) -> tuple[Any, Any]:
+            """V and D0; the highest asperity just touches at the load 0."""
+            if load == 0:
+                return arb(0), -Level(setup, contact).offsets[np.argmax(contact.scene.offsets)]
+            there = replace(setup, control=number(load), by_load=True)
+            found = Level(there, near_to(contact.scene, float(load)))
+            return found.energy, found.approach
+
+        travel = travel_of(setup.friction, setup.poisson_ratio)
         curve, total = MemoryCurve.pressed(start), arb(0)
         for point, (lost, moved) in zip(steps, weights, strict=True):
             curve, pieces = curve.go(P[point], Q[point] / f)
@@ -195,21 +182,12 @@ PATHS = {
 
 def assert_path(gradient: cr.Gradient, contact: cr.Contact, P: Any, Q: Any, value: Any) -> None:
     """Every derivative of a path against differences of it."""
-    exactly, f = (lambda each: [Fraction(float(e)) for e in each]), Fraction(FRICTION)
-    P, Q = exactly(P), exactly(Q)
-    setup = Setup.of(contact, "load")
-    with ctx.workdps(DIGITS):
-        base = value(setup, P, Q, f)
-        assert abs(gradient.value - float(base)) <= gradient.value_error * 1.01 + 1e-25
-
-    def of_scene(there: Setup, _: Any) -> tuple[Any, Any]:
-        return value(there, P, Q, f), None
-
-    judge = Judge(setup, of_scene)
-    hidden = replace(gradient, friction=None)
-    rng = np.random.default_rng(3)
+    P, Q = ([Fraction(float(each)) for each in values] for values in (P, Q))
+    setup, f, rng = Setup.of(contact, "load"), Fraction(FRICTION), np.random.default_rng(3)
+    judge = Judge(setup, lambda there, _: (value(there, P, Q, f), None))
+    assert abs(gradient.value - float(judge.at)) <= gradient.value_error * 1.01 + 1e-25
     for name in ("heights", "tip_radii", "positions", "sphere_radius", "contact_modulus"):
-        slopes, errors = known(hidden, name)
+        slopes, errors = known(gradient, name)
         v = rng.choice([-1.0, 1.0], size=slopes.shape)
         assert_close(judge.difference(name, exact(v)[()]), slopes * v, errors, name, SHARP)
     h = Fraction(1, 10**25) * max(P)
@@ -225,7 +203,7 @@ def assert_path(gradient: cr.Gradient, contact: cr.Contact, P: Any, Q: Any, valu
                 both = (P, there) if name == "forces" else (there, Q)
                 try:
                     with ctx.workdps(DIGITS):
-                        ends.append((value(setup, *both, f) - base) / (s * arb(float(h))))
+                        ends.append((value(setup, *both, f) - judge.at) / (s * arb(float(h))))
                 except cr.InputError:
                     ends.append(None)
             if None in ends:
@@ -239,18 +217,9 @@ def assert_path(gradient: cr.Gradient, contact: cr.Contact, P: Any, Q: Any, valu
             if np.isfinite(found[k]):
                 assert abs(found[k] - sum(sides) / 2) <= errors[k] + 1e-9 * scale + 1e-40
     with ctx.workdps(DIGITS):
-        e = Fraction(1, 10**25)
-        ends = [
-            value(
-                replace(setup, friction=arb(FRICTION) * (1 + s * arb("1e-25"))),
-                P,
-                Q,
-                f * (1 + s * e),
-            )
-            for s in (1, -1)
-        ]
-        slope = (ends[0] - ends[1]) / (2 * arb("1e-25") * FRICTION)
-        assert float(slope) == pytest.approx(gradient.friction, rel=1e-12)
+        h = Fraction(STEP)
+        up, down = (value(setup.moved("friction", s * arb(STEP)), P, Q, f + s * h) for s in (1, -1))
+        assert float((up - down) / (2 * arb(STEP))) == pytest.approx(gradient.friction, rel=1e-12)
 
 
 @pytest.mark.sample(1)
@@ -264,8 +233,7 @@ def assert_path(gradient: cr.Gradient, contact: cr.Contact, P: Any, Q: Any, valu
 )
 def test_paths(name: str, number: str) -> None:
     contact = small(within=0.0026)
-    loads, parts = np.array(PATHS[name])
-    P, Q = loads * contact.load, parts * contact.load
+    P, Q = np.array(PATHS[name]) * contact.load
     m = len(P)
     if number == "losses of the steady cycle":
         order = [*range(m), 0, *range(1, m), 0]

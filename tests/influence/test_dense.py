@@ -4,9 +4,10 @@ import numpy as np
 from flint import arb, ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from multiprecision import exact, inverse_sum
+from multiprecision import exact, inverse_sum, of_scene
 from scenes import rough
 
+from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair
 from convexrough.influence.choice import couple
 from convexrough.influence.coupling import inverse_distances
@@ -16,10 +17,8 @@ from convexrough.influence.shells import shells
 SCALE = 0.37
 
 
-def sums(points: np.ndarray, loads: Pair, row: int) -> arb:
-    """sum_j P_j / r_ij in 120 digits."""
-    ctx.dps = 120
-    return inverse_sum(exact(points), exact(loads.high) + exact(loads.low), row)
+def middle(ball: Ball, row: int) -> arb:
+    return arb(float(ball.mid.high[row])) + arb(float(ball.mid.low[row]))
 
 
 @settings(max_examples=40, deadline=None)
@@ -38,8 +37,7 @@ def test_sums_are_known(
     rng = np.random.default_rng(seed)
     points = rng.uniform(-1, 1, (count, 2))
     if layout == "grid":
-        side = int(np.ceil(np.sqrt(count)))
-        points = np.array([divmod(k, side) for k in range(count)], dtype=float)
+        points = np.stack(np.divmod(np.arange(count), int(np.ceil(np.sqrt(count)))), axis=1) * 1.0
     elif layout == "pairs":
         points[count // 2 :] = points[: count - count // 2] + 1e-6 * points[count // 2 :]
     high = rng.random(count) * {"uneven": 10.0 ** rng.uniform(-40, 0, count)}.get(kind, 1.0)
@@ -49,10 +47,10 @@ def test_sums_are_known(
     loads = Pair(high, high * 2.0**-54 * rng.uniform(-1, 1, count))
     operator = DenseInfluence.assemble(points, SCALE)
     found = operator.sums(loads)
+    ctx.dps = 120
     for row in {0, *rng.integers(0, count, 5).tolist()}:
-        exact = sums(points, loads, row)
-        value = arb(float(found.mid.high[row])) + arb(float(found.mid.low[row]))
-        assert abs(value - exact) <= arb(float(found.radius[row]))
+        true = inverse_sum(exact(points), exact(loads.high) + exact(loads.low), row)
+        assert abs(middle(found, row) - true) <= arb(float(found.radius[row]))
     most = float(operator.apply(np.abs(high)).max()) / SCALE
     if layout == "grid" and 1e-150 < most < 1e150:
         assert found.radius.max() <= (1e-25 if kind == "uneven" else 1e-26) * most
@@ -64,13 +62,10 @@ def test_sums_where_points_are_pairs() -> None:
     loads = Pair.exact(np.random.default_rng(4).random(len(scene)))
     found = couple(scene, np.arange(len(scene)), SCALE).sums(loads)
     ctx.dps = 60
-    tips = [arb(float(rho)) for rho in scene.asperities.tip_radii]
-    R = arb(float(scene.sphere_radius))
-    points = exact(scene.asperities.positions) * np.array([[R / (R + t)] for t in tips])
+    points, _, _ = of_scene(scene)
     for row in range(0, len(scene), 7):
-        middle = arb(float(found.mid.high[row])) + arb(float(found.mid.low[row]))
         true = inverse_sum(points, exact(loads.high), row)
-        assert abs(middle - true) <= arb(float(found.radius[row]))
+        assert abs(middle(found, row) - true) <= arb(float(found.radius[row]))
     assert (found.radius < 1e-26 * found.value).all()
 
 

@@ -1,6 +1,12 @@
 """What every compliance operator promises, against sums over all pairs in 160 bits."""
 
+import itertools
+import sys
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
+from types import FrameType
 from typing import Any
 
 import multiprecision
@@ -8,16 +14,19 @@ import numpy as np
 import pytest
 from extended import inverse_sums, pulled
 from flint import arb, ctx
-from numpy.typing import NDArray
 from point_layouts import BASES, LAYOUTS, lattice_patch, on_lattice, turned
+from scenes import paper
 
 import convexrough as cr
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair, two_product
+from convexrough.arrays import Array
 from convexrough.bench.scenes import APPROACH
 from convexrough.bench.scenes import scene as bench_scene
+from convexrough.influence import lattice
 from convexrough.influence.coupling import Coupling, Influence, JointCoupling, inverse_distances
 from convexrough.influence.dense import DenseInfluence
+from convexrough.influence.lattice import LatticeInfluence
 from convexrough.influence.scattered import ScatteredInfluence
 from convexrough.influence.shells import fitted_shells, shells
 from convexrough.normal.certificate import certify_on
@@ -27,8 +36,6 @@ from convexrough.roundoff import ROUNDOFF
 from convexrough.scene.lattice import Lattice
 from convexrough.solvers import Newton
 
-Array = NDArray[np.float64]
-
 SCALE = 0.37
 
 #: Layouts of which a mesh gives sums much better than products.
@@ -37,9 +44,8 @@ EVEN = ("disc", "jittered")
 
 def operator(kind: str, layout: str, rng: np.random.Generator, count: int = 0) -> Any:
     if kind == "lattice":
-        points = lattice_patch(
-            turned(BASES[layout], 0.3), count or int(rng.choice([40, 500, 1000]))
-        )
+        count = count or int(rng.choice([40, 500, 1000]))
+        points = lattice_patch(turned(BASES[layout], 0.3), count)
         return on_lattice(points + rng.choice([0.0, 300.0, 1e6]), SCALE)
     points = LAYOUTS[layout](rng)
     if kind == "dense":  # more than 64 points are summed in blocks
@@ -72,9 +78,8 @@ def test_products_and_sums(kind: str, layout: str, seed: int) -> None:
     rows, loads = rng.integers(0, len(A), 30), loadings(len(A), rng)
     shift = np.abs(A.points.mean(axis=0)).max() if kind == "lattice" else 0.0
     good = {"dense": 1e-14, "lattice": max(1e-14, 3e-16 * shift), "scattered": 1e-13}[kind]
-    for load, true, rest in zip(
-        loads, *(x.T for x in inverse_sums(A.points[rows], A.points, loads.T, SCALE)), strict=True
-    ):
+    sums = (each.T for each in inverse_sums(A.points[rows], A.points, loads.T, SCALE))
+    for load, true, rest in zip(loads, *sums, strict=True):
         product, sizes, rounding = A.apply(load), A.apply(np.abs(load)), A.rounding(load)
         error, top = np.abs(product[rows] - true - rest), float(sizes.max())
         assert error.max() <= good * top
@@ -130,6 +135,52 @@ def test_parts_and_other_points(kind: str, layout: str, seed: int, count: int) -
         for power in (2, 3):
             exactly, _ = inverse_sums(points, part.points, loads, power=power)
             assert (coupling.falloff(loads, power) >= exactly).all()
+
+
+def at_line(k: int, call: Callable[[], Any], other: Callable[[], Any]) -> tuple[Any, bool]:
+    """What `call` returns if another thread calls `other` before its kth line in the module of
+    lattices, and whether there are so many lines.
+    """
+    lines, before = itertools.count(), sys.gettrace()
+
+    def trace(frame: FrameType, event: str, _: Any) -> Any:
+        if frame.f_code.co_filename != lattice.__file__:
+            return None
+        if next(lines) == k:
+            thread.submit(other).result()
+        return trace
+
+    with ThreadPoolExecutor(1) as thread:
+        sys.settrace(trace)
+        try:
+            return call(), next(lines) > k
+        finally:
+            sys.settrace(before)
+
+
+def interrupted(points: Array, ask: Any, own: Any, other: Any, first: Any) -> Iterator[Any]:
+    """What `ask` returns for `own` if another thread asks for `other` at any moment."""
+    for k in itertools.count():
+        A = on_lattice(points, SCALE)
+        ask(A, first)
+        found, reached = at_line(k, partial(ask, A, own), partial(ask, A, other))
+        yield found
+        if not reached:
+            return
+
+
+def test_threads_that_restrict_one_operator_at_once_get_their_own() -> None:
+    points, own, other = lattice_patch(np.eye(2), 60), np.arange(40), np.arange(20, 60)
+    for part in interrupted(points, LatticeInfluence.restricted, own, other, first=other):
+        assert (part.points == points[own]).all()
+
+
+def test_threads_whose_loads_reach_unequally_far_get_their_own_sums() -> None:
+    points = lattice_patch(turned(BASES["square"], 0.3), 60)
+    near, everywhere = Pair.exact(np.eye(60)[0]), Pair.exact(np.ones(60))
+    true = on_lattice(points, SCALE).sums(near)
+    for found in interrupted(points, LatticeInfluence.sums, near, everywhere, first=near):
+        assert (np.abs((found - true).value) <= found.radius + true.radius).all()
 
 
 @pytest.mark.sample(4)
@@ -240,7 +291,7 @@ def test_gaps_on_a_lattice(geometry: Any, R: Any, shift: float | None) -> None:
     if shift is None:  # exactly on their sites
         lattice, shift = cr.Asperities.square(spacing=2.0**-9, tip_radius=0.02, within=0.01), 0.0
     else:
-        lattice = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
+        lattice = paper().asperities
     heights = 1e-6 * np.random.default_rng(4).standard_normal(len(lattice))
     asperities = cr.Asperities(lattice.positions + shift, 0.02, heights)
     scene = cr.Scene(R, asperities, cr.Material(0.7, 0.3), geometry=geometry)

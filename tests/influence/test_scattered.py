@@ -1,9 +1,12 @@
 """The coupling on a mesh: the sum over pairs, bounds on the error."""
 
+from unittest.mock import Mock
+
 import numpy as np
 import pytest
 from extended import inverse_sums
 from point_layouts import jittered
+from scenes import on_sphere
 
 import convexrough as cr
 from convexrough.influence.coupling import inverse_distances
@@ -36,14 +39,12 @@ def test_upper_bounds_on_sums() -> None:
 def test_point_error_is_counted() -> None:
     rng = np.random.default_rng(8)
     points = jittered(rng)
-    error = 1e-13
-    moved = points + rng.choice([-error, error], points.shape)
-    operator = ScatteredInfluence(points, SCALE, error)
+    moved = points + rng.choice([-1e-13, 1e-13], points.shape)
+    operator = ScatteredInfluence(points, SCALE, 1e-13)
     loads = rng.random(len(points))
     computed = operator.apply(loads)
     true, rest = inverse_sums(moved[:60], moved, loads, SCALE)
-    error = np.abs(computed[:60] - true - rest)
-    assert (error <= operator.rounding(loads).of(computed)[:60]).all()
+    assert (np.abs(computed[:60] - true - rest) <= operator.rounding(loads).of(computed)[:60]).all()
     exactly = ScatteredInfluence(points, SCALE).rounding(loads)
     assert (operator.rounding(loads).of(computed) >= 10 * exactly.of(computed)).all()
     far = points + rng.choice([-2e-6, 2e-6], points.shape)
@@ -59,10 +60,9 @@ def test_presses_of_points_in_distant_clusters() -> None:
     rng = np.random.default_rng(10)
     patch = np.stack(np.meshgrid(np.arange(30), np.arange(30)), -1).reshape(-1, 2)
     patch = patch + rng.uniform(-0.3, 0.3, patch.shape)
-    material = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
     far = np.array([[2e4, 1e4]])
     for points in (np.vstack((patch, patch + far)), np.vstack((patch, far))):
-        scene = cr.Scene(np.inf, cr.Asperities(points, 10.0), material, geometry="summit")
+        scene = on_sphere(points, 10.0, radius=np.inf)
         assert cr.press(scene, approach=0.02, influence="scattered").iterations <= 8
 
 
@@ -70,11 +70,7 @@ def test_an_interrupted_mesh_is_made_again(monkeypatch: pytest.MonkeyPatch) -> N
     """Else the operator would fall back to a matrix, which may not fit in memory."""
     operator = ScatteredInfluence(jittered(np.random.default_rng(2)), SCALE)
     with monkeypatch.context() as patch:
-        patch.setattr(Product, "assemble", interrupted)
+        patch.setattr(Product, "assemble", Mock(side_effect=KeyboardInterrupt))
         with pytest.raises(KeyboardInterrupt):
             operator.apply(np.ones(len(operator)))
     assert operator._double is not None
-
-
-def interrupted(*_: object) -> None:
-    raise KeyboardInterrupt

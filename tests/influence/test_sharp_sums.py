@@ -1,22 +1,21 @@
 """Sharp sums on a mesh against exact fractions and ball arithmetic: each step, and all together."""
 
 from fractions import Fraction
+from itertools import product as product_of
 from math import ceil, floor, log2
 
 import numpy as np
 import pytest
 from flint import arb, ctx
-from numpy.typing import NDArray
 from point_layouts import disc
 
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair
+from convexrough.arrays import Array
 from convexrough.influence import sharp_sums as sharp
 from convexrough.influence.pair_sums import Product
 from convexrough.influence.softened import Softened, exact_series
 from convexrough.influence.splitting import Splitting
-
-Array = NDArray[np.float64]
 
 SPACING = 0.0371
 KERNELS = {order: Softened(1, order, 0.43) for order in (4, 12, 26)}
@@ -69,10 +68,6 @@ def test_values_within_the_reach_and_beyond(order: int) -> None:
     assert float(np.abs(head).max()) < 1
 
 
-def scattered_loads(rng: np.random.Generator, count: int) -> Array:
-    return np.asarray(rng.choice([-1.0, 1.0], count) * rng.random(count) ** 3)
-
-
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("order", [4, 12, 26])
 @pytest.mark.parametrize("crowded", [False, True])
@@ -81,7 +76,7 @@ def test_loads_on_nodes(order: int, crowded: bool) -> None:
     rng = np.random.default_rng(order)
     points = disc(rng, 300) * (0.05 if crowded else 0.4)
     points[0] = 0.7, 0.6
-    product, loads = assembled(order, points), scattered_loads(rng, 300)
+    product, loads = assembled(order, points), rng.uniform(-1, 1, 300) ** 3
     placed = product.mesh
     field, error = sharp._to_nodes(product, Pair.exact(loads[placed.places]))
     plain = placed.to_nodes(loads[placed.places])[:, : placed.box.shape[1]]
@@ -93,10 +88,10 @@ def test_loads_on_nodes(order: int, crowded: bool) -> None:
         # A stencil begins at its cell, as nodes are counted from 1 - p/2.
         nodes = np.stack((a - placed.cells[:, 0], b - placed.cells[:, 1]), axis=1)
         for k in np.flatnonzero(((nodes >= 0) & (nodes < order)).all(axis=1)):
-            x, y = (
-                weight(float(placed.shares[k, c]), int(nodes[k, c]) + 1 - order // 2, order)
-                for c in (0, 1)
+            places = zip(
+                placed.shares[k].tolist(), (nodes[k] + 1 - order // 2).tolist(), strict=True
             )
+            x, y = (weight(place, node, order) for place, node in places)
             part = Fraction(float(loads[placed.places[k]])) * x * y
             true, total = true + part, total + abs(part)
         found = Fraction(float(field.high[a, b])) + Fraction(float(field.low[a, b]))
@@ -125,20 +120,13 @@ def test_values_at_points(order: int) -> None:
     missed = 0
     for k in range(0, 200, 20):
         true = Fraction(0)
-        factors = [
-            [weight(float(placed.shares[k, c]), n + 1 - order // 2, order) for n in range(order)]
-            for c in (0, 1)
-        ]
+        stencil = range(1 - order // 2, order // 2 + 1)
+        factors = (
+            [weight(place, n, order) for n in stencil] for place in placed.shares[k].tolist()
+        )
         i, j = placed.cells[k].tolist()
-        for m, x in enumerate(factors[0]):
-            line = sum(
-                (
-                    y * (Fraction(whole[i + m, j + n]) + Fraction(rest[i + m, j + n]))
-                    for n, y in enumerate(factors[1])
-                ),
-                Fraction(0),
-            )
-            true += x * line
+        for (m, x), (n, y) in product_of(*map(enumerate, factors)):
+            true += x * y * (Fraction(whole[i + m, j + n]) + Fraction(rest[i + m, j + n]))
         true /= 2**40
         found = (Fraction(float(exactly[k])) + Fraction(float(left[k]))) * Fraction(unit)
         assert abs(found - true) <= Fraction(rounding) * Fraction(unit)

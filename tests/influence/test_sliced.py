@@ -2,41 +2,36 @@
 
 from fractions import Fraction
 
-import multiprecision
 import numpy as np
 import pytest
 from flint import arb, ctx
+from multiprecision import exact, inverse_sum
 from numpy.typing import NDArray
 from point_layouts import on_lattice
 
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair
+from convexrough.arrays import Array
 from convexrough.influence.convolution import SiteBox, through_waves
 from convexrough.influence.sliced import Distances, Sliced, cut
-
-Array = NDArray[np.float64]
 
 BASES = {
     "hexagonal": [[1.0, 0.0], [0.5, 0.8660254037844386]],
     "turned": [[0.9, 0.31], [-0.4, 1.1]],
     "long": [[1.0, 0.02], [0.3, 37.0]],
 }
-#: [length] units of basis vectors, and the power of two below their length.
-SIZES = {"one": (1.0, 0.5), "small": (1.3e-5, 2.0**-17)}
 
 
-def taken(name: str, size: str) -> tuple[Array, float]:
-    length, unit = SIZES[size]
-    return np.array(BASES[name]) * length, unit
-
-
-def distance(basis: Array, unit: float, i: int, j: int) -> arb:
-    a, b = ([arb(x) / arb(unit) for x in row] for row in basis.tolist())
-    return ((i * a[0] + j * b[0]) ** 2 + (i * a[1] + j * b[1]) ** 2).sqrt()
-
-
-def exactly(basis: Array, unit: float) -> list[list[Fraction]]:
-    return [[Fraction(x) / Fraction(unit) for x in row] for row in basis.tolist()]
+def sliced_on(
+    basis: Array, unit: float, shape: tuple[int, int], count: int
+) -> tuple[SiteBox, NDArray[np.intp], Distances, Sliced]:
+    """A box of sites, where they are in it, their distances over `unit`, and slices of those."""
+    length = np.hypot(*basis[0])
+    box = SiteBox(shape, basis / length)
+    exactly = [[Fraction(x) / Fraction(unit) for x in row] for row in basis.tolist()]
+    distances, norm = Distances.of(exactly, max(shape)), box.kernel(1, np.float64).norm
+    places = np.add.outer(np.arange(shape[0]) * box.stride, np.arange(shape[1])).ravel()
+    return box, places, distances, Sliced.of(box, distances, norm * unit / length, unit, count)
 
 
 def middle(ball: Ball) -> arb:
@@ -54,17 +49,12 @@ def among(ball: Ball, m: int) -> arb:
 @pytest.mark.parametrize("shape", [(1, 1), (1, 9), (7, 1), (9, 11), (24, 31)])
 def test_levels_are_exact(name: str, count: int, shape: tuple[int, int]) -> None:
     """Against long integers, bit for bit, with so much to spare that rounding is sure."""
-    basis, unit = taken(name, "one")
-    box = SiteBox(shape, basis / np.hypot(*basis[0]))
-    distances = Distances.of(exactly(basis, unit), max(shape))
-    sliced = Sliced.of(box, distances, box.kernel(1, np.float64).norm, unit, count)
+    box, places, distances, sliced = sliced_on(np.array(BASES[name]), 0.5, shape, count)
     loads = Pair.exact(np.random.default_rng(1).random(shape[0] * shape[1]) ** 3)
     slices, _ = sliced._cut(loads)
-    fields = [each.reshape(shape) for each in slices]
-    places = np.add.outer(np.arange(shape[0]) * box.stride, np.arange(shape[1])).ravel()
-    levels = through_waves(
-        [box.laid_out(each, places) for each in slices], box.padded, 1, sliced._levels
-    )
+    fields = [each.reshape(shape).astype(int).astype(object) for each in slices]
+    laid_out = [box.laid_out(each, places) for each in slices]
+    levels = through_waves(laid_out, box.padded, 1, sliced._levels)
     # The slices of the kernel, from its values: K(-d) = K(d).
     i, j = np.arange(-shape[0] + 1, shape[0]), np.arange(-shape[1] + 1, shape[1])
     values = cut(distances.at(i, j), sliced.bits, sliced.more, count)
@@ -72,14 +62,12 @@ def test_levels_are_exact(name: str, count: int, shape: tuple[int, int]) -> None
         assert kernel.norm == pytest.approx(float(np.linalg.norm(each)), rel=1e-12)
     for level in range(count - 1):
         for m, n in [(0, 0), (shape[0] - 1, 0), (shape[0] // 2, shape[1] // 2)]:
-            exact = 0
+            true = 0
             for s in range(level + 1):
                 rows, columns = np.indices(shape)
                 kernel = values[level - s][m - rows + shape[0] - 1, n - columns + shape[1] - 1]
-                exact += sum(
-                    int(a) * int(b) for a, b in zip(kernel.flat, fields[s].flat, strict=True)
-                )
-            assert abs(Fraction(float(levels[level][m, n])) - exact) < 0.1
+                true += (kernel.astype(int).astype(object) * fields[s]).sum()
+            assert abs(Fraction(float(levels[level][m, n])) - true) < 0.1
 
 
 LOADS = ["even", "steep", "few", "negative", "alike"]
@@ -100,29 +88,22 @@ def loadings(kind: str, shape: tuple[int, int]) -> Pair:
 
 
 @pytest.mark.sample(6)
-@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize(("length", "unit"), [(1.0, 0.5), (1.3e-5, 2.0**-17)])
 @pytest.mark.parametrize("name", BASES)
 @pytest.mark.parametrize("kind", LOADS)
 @pytest.mark.parametrize("count", [2, 3, 4])
-def test_sums_against_ball_arithmetic(name: str, size: str, kind: str, count: int) -> None:
-    basis, unit = taken(name, size)
-    shape = (17, 23)
+def test_sums_against_ball_arithmetic(
+    name: str, length: float, unit: float, kind: str, count: int
+) -> None:
+    basis, shape = np.array(BASES[name]) * length, (17, 23)
+    _, places, _, sliced = sliced_on(basis, unit, shape, count)
     loads = loadings(kind, shape)
-    box = SiteBox(shape, basis / np.hypot(*basis[0]))
-    distances = Distances.of(exactly(basis, unit), max(shape))
-    norm = box.kernel(1, np.float64).norm * unit / float(np.hypot(*basis[0]))
-    sliced = Sliced.of(box, distances, norm, unit, count)
-    places = np.add.outer(np.arange(17) * box.stride, np.arange(23)).ravel()
-    found = sliced.sums(loads, places)
-    good = {2: 1e-18, 3: 1e-22, 4: 1e-26}[count]
+    found, good = sliced.sums(loads, places), {2: 1e-18, 3: 1e-22, 4: 1e-26}[count]
     with ctx.workprec(300):
-        for m, n in [(0, 0), (16, 22), (8, 3)]:
-            exact = arb(0)
-            for k, (row, column) in enumerate(np.ndindex(shape)):
-                if (row, column) != (m, n):
-                    r = distance(basis, unit, m - row, n - column) * arb(unit)
-                    exact += (arb(float(loads.high[k])) + arb(float(loads.low[k]))) / r
-            assert among(found, 23 * m + n).contains(exact)
+        points = exact(np.stack(np.indices(shape), axis=-1).reshape(-1, 2)) @ exact(basis)
+        for row in (0, 16 * 23 + 22, 8 * 23 + 3):
+            true = inverse_sum(points, exact(loads.high) + exact(loads.low), row)
+            assert among(found, row).contains(true)
     assert found.radius.max() < good * float(np.abs(loads.high).sum()) / unit
 
 
@@ -149,9 +130,9 @@ def test_points_are_where_they_are(seed: int, slices: int) -> None:
     worst = 0.0
     with ctx.workprec(200):
         for m in (0, 17, 119):
-            exact = multiprecision.inverse_sum(*map(multiprecision.exact, (points, loads)), m)
-            assert among(found, m).contains(exact)
-            worst = max(worst, float(abs(middle(found[m]) - exact).mid()))
+            true = inverse_sum(exact(points), exact(loads), m)
+            assert among(found, m).contains(true)
+            worst = max(worst, float(abs(middle(found[m]) - true).mid()))
     bound = float(found.radius.max())
     assert bound < {2: 1e-4, 3: 1e-9, 4: 1e-10}[slices] * A.rounding(loads).each
     assert worst < 0.1 * bound

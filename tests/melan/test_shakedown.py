@@ -12,8 +12,8 @@ from flint import arb
 from multiprecision import solve_linear
 from numpy.testing import assert_allclose
 from path_scenes import LARGEST, PAPER, SCENES, shaded
-from scenes import solve_exactly, twins
-from scipy.sparse import csc_matrix, vstack
+from scenes import on_sphere, solve_exactly, twins
+from scipy.sparse import csc_matrix
 from vector_oracle import tangential_kernel
 
 import convexrough as cr
@@ -150,19 +150,13 @@ class Stuck:
         self.slip = np.zeros(len(limits))
 
     def go(self, total: Array) -> None:
-        n, scale = len(self.P), np.abs(self.K).max()
-        balance = np.tile(np.eye(2), n)
-        rows = np.zeros((3 * n, 2 * n))
-        rows[3 * np.arange(n) + 1, 2 * np.arange(n)] = -1.0
-        rows[3 * np.arange(n) + 2, 2 * np.arange(n) + 1] = -1.0
-        constant = np.zeros(3 * n)
-        constant[::3] = self.P
-        unit = self.P.max()
+        n, scale, unit = len(self.P), np.abs(self.K).max(), self.P.max()
+        bounded = np.kron(np.eye(n), [[0.0, 0.0], [-1.0, 0.0], [0.0, -1.0]])
         program = ConeProgram(
             csc_matrix(np.triu(self.K) / scale),
             -self.K @ (self.q / unit) / scale,
-            csc_matrix(vstack([csc_matrix(balance), csc_matrix(rows)])),
-            np.append(total, constant) / unit,
+            csc_matrix(np.vstack((np.tile(np.eye(2), n), bounded))),
+            np.append(total, np.kron(self.P, [1.0, 0.0, 0.0])) / unit,
             2,
         )
         raw = run_clarabel(program, "stuck", 1e-11)
@@ -175,30 +169,20 @@ class Stuck:
 def test_cycles_below_and_above_melans_limit(kind: Any) -> None:
     """From a first loading that slides: slip dies out 1 % below, and goes on 1 % above."""
     contact = cr.press(PAPER, load=P)
-    problem = contact.cached(FrictionProblem)
-    n = len(problem)
-    mean = np.array([0.3, 0.1 if kind == "vector" else 0.0]) * P
-    swing = np.array([[1.0, 0.0], [-1.0, 0.0]]) * P
-    vector = kind == "vector"
-    forces, kernel = mean if vector else mean[0], np.kron(problem.influence.matrix, np.eye(2))
-    limit = cr.shakedown(
-        PAPER, load=P, force=0.5 * forces, force_amplitudes=swung(kind, 0.5 * P), kind=kind
-    )
-    kernel = problem.kernel if vector else kernel
-    K = kernel + np.diag(np.repeat(problem.compliance, 2))
-    unit = problem.units.force
-    slid = {}
-    for part in (0.99, 1.01):
-        state = Stuck(K, problem.loads)
-        slips = []
+    problem, vector = contact.cached(FrictionProblem), kind == "vector"
+    assert len(problem) == 37
+    mean, swing = np.array([0.3, 0.1 if vector else 0.0]) * P, np.array([P, 0.0])
+    given = {"force": 0.5 * (mean if vector else mean[0]), "kind": kind}
+    limit = cr.shakedown(PAPER, load=P, force_amplitudes=swung(kind, 0.5 * P), **given)
+    kernel = problem.kernel if vector else np.kron(problem.influence.matrix, np.eye(2))
+    slid: dict[float, list[float]] = {0.99: [], 1.01: []}
+    for part, slips in slid.items():
+        state = Stuck(kernel + np.diag(np.repeat(problem.compliance, 2)), problem.loads)
         for _ in range(40):
-            cycle = 0.0
-            for turn in swing:
-                state.go((mean + part * limit.factor * turn) / unit)
-                cycle += float(np.abs(state.slip).max())
-            slips.append(cycle)
-        slid[part] = slips
-    assert n == 37
+            slips.append(0.0)
+            for turn in (swing, -swing):
+                state.go((mean + part * limit.factor * turn) / problem.units.force)
+                slips[-1] += float(np.abs(state.slip).max())
     assert slid[0.99][0] > 1e-3 * slid[1.01][-1]  # something slides at first
     assert slid[0.99][-1] < 0.03 * slid[1.01][-1]
     assert slid[0.99][-1] < 0.5 * slid[0.99][19] + LEFT * slid[1.01][-1]
@@ -257,14 +241,14 @@ def test_a_solver_that_lies_does_not_move_the_limit(lie: str, monkeypatch: Any) 
     def liar(*arguments: object) -> RawAnswer:
         raw = honest(*arguments)
         x, z = raw.x, raw.multipliers
-        if lie == "nothing":
-            return raw._replace(x=0 * x, multipliers=1e-3 * rng.standard_normal(len(z)))
-        if lie == "noise":
-            noise = [1 + 0.05 * rng.standard_normal(len(each)) for each in (x, z)]
-            return raw._replace(x=x * noise[0], multipliers=z * noise[1])
-        if lie == "doubled":
-            return raw._replace(x=2 * x, multipliers=2 * z)
-        return raw._replace(x=-x, multipliers=-z)
+        noise = [rng.standard_normal(len(each)) for each in (x, z)]
+        x, z = {
+            "nothing": (0 * x, 1e-3 * noise[1]),
+            "noise": (x * (1 + 0.05 * noise[0]), z * (1 + 0.05 * noise[1])),
+            "doubled": (2 * x, 2 * z),
+            "backwards": (-x, -z),
+        }[lie]
+        return raw._replace(x=x, multipliers=z)
 
     monkeypatch.setattr(melan, "run_clarabel", liar)
     found = cr.shakedown(PAPER, load=P, force_amplitudes=swing, kind="vector")
@@ -296,11 +280,8 @@ def test_a_contact_that_is_not_proved_proves_no_limit(kind: Any) -> None:
 
 @pytest.mark.parametrize("kind", ["exact", "elastic", "vector"])
 def test_one_asperity_slides_on_only_as_all_do(kind: Any) -> None:
-    alone = cr.Asperities([[0.0, 0.0]], 1.0)
-    scene = cr.Scene(1.0, alone, cr.Material(1.0, 0.3), friction=0.5, geometry="summit")
-    amplitudes = swung(kind, 1e-7)
-    found = cr.shakedown(scene, load=1e-6, force_amplitudes=amplitudes, kind=kind)
-    assert found.factor == pytest.approx(5.0)
-    assert found.gross == pytest.approx(5.0)
+    alone, amplitudes = on_sphere([[0.0, 0.0]], 1.0, friction=0.5), swung(kind, 1e-7)
+    found = cr.shakedown(alone, load=1e-6, force_amplitudes=amplitudes, kind=kind)
+    assert [found.factor, found.gross] == pytest.approx([5.0, 5.0])
     assert found.proved
     assert found.gap < 1e-10

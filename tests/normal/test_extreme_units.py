@@ -31,9 +31,6 @@ def test_contact_points_too_near_to_each_other(exponent: int) -> None:
             cr.Scene(1e-10, asperities, MATERIAL, geometry="closest")
 
 
-SIZES = (1e-60, 1e-20, 1e20, 1e60)
-
-
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("control", ["approach", "load"])
 @pytest.mark.parametrize("geometry", ["summit", "closest"])
@@ -41,7 +38,8 @@ SIZES = (1e-60, 1e-20, 1e20, 1e60)
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of float64's range, which is the point
 def test_extremes_are_answered_or_refused(modulus: float, geometry: Any, control: str) -> None:
     """Never ZeroDivisionError: of sums in the bound on the approach, above all."""
-    for radius, tip, size, given in itertools.product(SIZES, SIZES, (1e-57, 1e57), SIZES):
+    sizes = (1e-60, 1e-20, 1e20, 1e60)
+    for radius, tip, size, given in itertools.product(sizes, sizes, (1e-57, 1e57), sizes):
         try:
             asperities = cr.Asperities(HEXAGON * size, tip)
             scene = cr.Scene(radius, asperities, cr.Material(modulus, 0.3), 0.5, geometry)

@@ -1,5 +1,6 @@
 """The normal problem: derivatives, bounds, convexity, and contacts with known answers."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scenes import (
-    MATERIAL,
     OPERATORS,
     PAPER_APPROACH,
     hexagonal,
@@ -43,8 +43,8 @@ def assembled(scene: cr.Scene, **control: Any) -> NormalProblem:
 
 
 def test_screening_drops_only_those_that_cannot_touch() -> None:
-    problem = assembled(paper(), approach=PAPER_APPROACH)
-    assert len(problem) == 61  # the ring at 4 spacings lies at D = 0 to rounding, and is kept
+    # The ring at 4 spacings lies at D = 0 to rounding, and is kept.
+    assert len(assembled(paper(), approach=PAPER_APPROACH)) == 61
     problem = assembled(paper(), approach=1e-5)
     inside = paper().asperities.distances < np.sqrt(2e-5)
     assert set(problem.candidates) == set(np.flatnonzero(inside))
@@ -126,49 +126,24 @@ def test_nothing_where_the_smooth_sphere_would_touch(prescribed: dict[str, Any])
 @pytest.mark.parametrize("load", [1e-9, 2e-7])
 def test_the_bound_is_above_the_approach(rough: dict[str, Any], load: float) -> None:
     """How far a scene has to reach under a load."""
-
-    def scene_within(within: float) -> cr.Scene:
-        return hexagonal(within=within, **rough)
-
-    def farthest(approach: float) -> float:
-        return reach(
-            approach,
-            sphere_radius=1.0,
-            tip_radius=largest_tip_radius(0.02, rough.get("tip_radius_cv", 0.0)),
-            height=CUT_DEVIATIONS * rough.get("height_std", 0.0),
-            geometry="summit",
-        )
-
-    scene, bound = all_that_could_touch(scene_within, farthest, load)
+    tip = largest_tip_radius(0.02, rough.get("tip_radius_cv", 0.0))
+    height = CUT_DEVIATIONS * rough.get("height_std", 0.0)
+    highest = dict(sphere_radius=1.0, tip_radius=tip, height=height, geometry="summit")
+    scene_within = partial(hexagonal, 0.0025, 0.02, **rough)
+    scene, bound = all_that_could_touch(scene_within, partial(reach, **highest), load)
     assert cr.press(scene, load=load).certificate.approach <= bound * (1 + 1e-12)
 
 
-def test_no_proof_where_loads_lie_beyond_a_face_of_the_box() -> None:
-    problem = assembled(paper(), load=3.6e-7)
-    state = refined_loads(problem, Newton().solve(problem).loads)
-    box = tried(problem, state.loads.high, state.product)
-    assert box is not None
-    assert proved(problem, state, box).box is box
-    lower = box._replace(faces=0.9 * state.loads.high)
-    assert proved(problem, state, lower).box is None
-
-
 def test_bounds_cover_all_loads_within_an_uncertain_total() -> None:
-    pair = cr.Asperities([[-1e-3, 0.0], [1e-3, 0.0]], 0.02)  # alike: the loads only scale
-    problem = assembled(cr.Scene(1.0, pair, MATERIAL), load=1e-8)
-    total = problem.load
-    assert total is not None
+    pair = on_sphere([[-1e-3, 0.0], [1e-3, 0.0]])  # alike: the loads only scale
+    problem = assembled(pair, load=1e-8)
+    total: Any = problem.load
     state = refined_loads(problem, Newton().solve(problem).loads)
     box = tried(problem, state.loads.high, state.product)
-    wide, higher = (
-        proved(each, refined_loads(each, state.loads.high), box)
-        for each in (
-            problem.at_load(Ball.around(total, 1e-6 * total)),
-            problem.at_load(Ball.exact(total * (1 + 0.999e-6))),
-        )
-    )
-    assert wide.box is box
-    assert higher.box is box
+    totals = Ball.around(total, 1e-6 * total), Ball.exact(total * (1 + 0.999e-6))
+    problems = [problem.at_load(each) for each in totals]
+    wide, higher = (proved(each, refined_loads(each, state.loads.high), box) for each in problems)
+    assert wide.box is higher.box is box
     for name in ("loads", "indentation", "approach"):
         moved = np.abs((getattr(higher, name) - getattr(wide, name)).value)
         assert (moved <= getattr(wide, name).radius).all(), name

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import proof_oracle
 import scenes
-from path_scenes import shaded
+from path_scenes import ring, shaded
 
 import convexrough as cr
 from convexrough import checker
@@ -27,19 +27,18 @@ Place = tuple[Any, ...]
 @cache
 def honest() -> list[Any]:
     """Small proofs of every kind: controls, geometries, arguments, scopes, order."""
-    six = [[np.cos(t), np.sin(t)] for t in np.arange(6) * np.pi / 3]
     heights = [0, -2e-6, -4e-6, -6e-6, -1e-5, -1.5e-5, -3e-5]  # the last is open
-    ring = cr.Asperities(0.0025 * np.array([[0, 0], *six]), 0.02, heights)
+    seven = cr.Asperities(0.0025 * ring(6), 0.02, heights)
     proofs = []
     for geometry, friction in (("summit", 0.5), ("closest", None)):
-        scene = cr.Scene(1.0, ring, scenes.MATERIAL, friction=friction, geometry=geometry)
+        scene = cr.Scene(1.0, seven, scenes.MATERIAL, friction=friction, geometry=geometry)
         contact = cr.press(scene, approach=2e-5)
         for each in (contact, cr.press(scene, load=contact.load)):
             forces = [0.3 * friction * each.load, 0.9 * friction * each.load] if friction else []
             proofs.append(each.proof(sheared=[SimpleNamespace(force=Q) for Q in forces]))
     lifted = cr.press(shaded(), load=2.96)
     proofs.append(lifted.proof(sheared=[SimpleNamespace(force=0.4 * lifted.load)]))
-    loads = cr.press(lifted.scene, load=2.96).loads * (1 + 1e-3 * (np.arange(6) == 0))
+    loads = lifted.loads * (1 + 1e-3 * (np.arange(6) == 0))
     proofs.append(prove(lifted.scene, loads, load=2.96))
     proofs += [crowded(3, 5, 1.9, 0.5).proof(), crowded(9, 6, 2.2, 0.1).proof()]
     documents = [json.loads(json.dumps(proof.document)) for proof in proofs]

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 import scenes
 from flint import arb, ctx, fmpq
-from path_scenes import shaded
+from path_scenes import ring, shaded
 
 import convexrough as cr
 from convexrough import checker
@@ -42,8 +42,7 @@ def test_it_imports_the_standard_library_only() -> None:
 
 @pytest.fixture(scope="module")
 def document() -> Any:
-    scene, approach = scenes.NAMED["paper"]
-    return json.loads(json.dumps(cr.press(scene, approach=approach).proof().document))
+    return proof_of(*scenes.NAMED["paper"])
 
 
 @pytest.fixture(scope="module")
@@ -122,8 +121,12 @@ def test_more_than_one_file_is_refused(capsys: pytest.CaptureFixture[str]) -> No
     assert "usage" in capsys.readouterr().err
 
 
-def proof_of(scene: cr.Scene, approach: float, **more: Any) -> Any:
-    return json.loads(json.dumps(cr.press(scene, approach=approach).proof(**more).document))
+def copied(proof: Any) -> Any:
+    return json.loads(json.dumps(proof.document))
+
+
+def proof_of(scene: cr.Scene, approach: float) -> Any:
+    return copied(cr.press(scene, approach=approach).proof())
 
 
 def scaled(values: list[str], factor: float) -> list[str]:
@@ -149,11 +152,8 @@ def wrong(
 
 def test_scenes_that_are_too_large_impossible_or_of_another_hash_are_refused(document: Any) -> None:
     wrong(document, "sha256", scene__heights__0=(1e-30).hex())
-    many = checker.MOST_ASPERITIES + 1
-    columns = {
-        f"scene__{name}": [document["scene"][name][0]] * many
-        for name in ("x", "y", "heights", "tip_radii")
-    }
+    names, many = ("x", "y", "heights", "tip_radii"), checker.MOST_ASPERITIES + 1
+    columns = {f"scene__{name}": [document["scene"][name][0]] * many for name in names}
     wrong(document, "3001 asperities", sha256="fits", **columns)
     negative = (-1.0).hex()
     wrong(document, "is not positive", sha256="fits", scene__sphere_radius=negative)
@@ -231,10 +231,10 @@ def test_what_is_damaged_is_named(few: Any, place: str) -> None:
 
 def test_an_asperity_that_is_dragged_along_is_refused() -> None:
     """One between six blunt ones loses load as the total rises, so regains some in shear."""
-    six = [[np.cos(t), np.sin(t)] for t in np.arange(6) * np.pi / 3]
-    points = 0.0025 * np.array([[0, 0], *six])
-    ring = scenes.on_sphere(points, [0.02, *[0.1] * 6], [-1e-5, *[0.0] * 6], friction=0.5)
-    contact = cr.press(ring, approach=7.6e-5)
+    tips, heights = [0.02, *[0.1] * 6], [-1e-5, *[0.0] * 6]
+    contact = cr.press(
+        scenes.on_sphere(0.0025 * ring(6), tips, heights, friction=0.5), approach=7.6e-5
+    )
     assert contact.proof().document["claims"]["scope"] == "global"
     left = cr.press(contact.scene, load=0.99 * contact.load)
     assert left.loads[0] > contact.loads[0]
@@ -255,13 +255,13 @@ def test_a_loss_is_claimed_in_order_alone() -> None:
     proof = contact.proof(sheared=[SimpleNamespace(force=state.force)])
     assert "(proved for one step)" in proof.proved
     assert "no loss is proved" in proof.proved
-    document = json.loads(json.dumps(proof.document))
+    document = copied(proof)
     claim = document["claims"]["shear"][0]
     assert (claim["order"], claim["loss"]) == ("proved for one step", None)
     wrong(document, "proved 'proved for one step'", claims__shear__0__order="proved")
     ordered = cr.press(replace(scenes.paper(), friction=0.5), approach=5e-5)
     state = cr.shear(ordered, force=0.4 * 0.5 * ordered.load)
-    weaker = json.loads(json.dumps(ordered.proof(sheared=[state]).document))
+    weaker = copied(ordered.proof(sheared=[state]))
     weaker["claims"]["shear"][0] |= {"order": "proved for one step", "loss": None}
     assert "(proved for one step)" in checker.check(weaker)
     wrong(document, "loss: claimed", claims__shear__0__loss=[(0.0).hex(), (1.0).hex()])
@@ -282,10 +282,9 @@ def test_shells_prove_what_eigenvalues_show() -> None:
         np.fill_diagonal(apart, np.inf)
         radii = np.pi / 2 * apart.min(axis=0) * 10 ** rng.uniform(-1.5, 0, 8)
         shells = radii * 2 / np.pi * 2.0 ** rng.uniform(0, 3)
-        given_shells, given_radii = (list(map(Fraction, each.tolist())) for each in (shells, radii))
+        lengths = (list(map(Fraction, each.tolist())) for each in (shells, radii))
         try:
-            everyone = list(range(8))
-            checker.prove_by_shells(read, given_shells, given_radii, everyone)
+            checker.prove_by_shells(read, *lengths, list(range(8)))
         except Refused:
             continue
         accepted += 1
@@ -344,25 +343,22 @@ def test_cholesky_finds_where_the_matrix_turns_indefinite() -> None:
 
 def test_two_solutions_are_both_proved_and_neither_is_the_only_one() -> None:
     """Deep in two neighbours: one carries all and keeps the other open, or the other way round."""
-    depth, apart = 1.0, 1.0
-    scene = scenes.on_sphere([[0, 0], [apart, 0]], 9.0, radius=1e30)
-    radius = float(scene.relative_radii[0])
-    a = math.sqrt(radius * depth)
-    assert a > 3 * math.pi / 4 * apart  # then it pushes the other down by more than the approach
+    depth, scene = 1.0, scenes.on_sphere([[0, 0], [1.0, 0]], 9.0, radius=1e30)
+    a = math.sqrt(float(scene.relative_radii[0]) * depth)
+    assert a > 3 * math.pi / 4  # then it pushes the other down by more than the approach
     trivial = cr.press(scene, approach=1e-9).proof().document
     for first, second in ((a, 0.0), (0.0, a)):
         box = [max(1.01 * x, 0.3).hex() for x in (first, second)]
+        argument = {"box": box, "convexity_number": (0.99).hex(), "shells": None}
         document = deepcopy(trivial) | {
             "prescribed": {"approach": depth.hex()},
-            "argument": trivial["argument"]
-            | {"box": box, "convexity_number": (0.99).hex(), "shells": None},
+            "argument": trivial["argument"] | argument,
             "pressed": {"radii": [[first.hex()], [second.hex()]], "approach": [depth.hex()]},
         }
         document["sha256"] = checker.digest(document["scene"], document["prescribed"])
         proved = checker.prove(document)
         assert proved["scope"] == "local"
         assert proved["status"] == ["contact" if x else "open" for x in (first, second)]
-        wide = [(1.01 * a).hex()] * 2
-        document["argument"] |= {"box": wide}
+        document["argument"] |= {"box": [(1.01 * a).hex()] * 2}
         with pytest.raises(Refused, match="breaks down"):
             checker.prove(document)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from attacks import assert_honest
 from proof_oracle import false_claims
-from scenes import MATERIAL, rough, solve_exactly
+from scenes import MATERIAL, rough, solve_exactly, stepped
 
 import convexrough as cr
 from convexrough import checker
@@ -56,8 +56,8 @@ def test_many_under_a_flat_base(within: float, control: Any) -> None:
     shallow = contact.loads[rough.heights < -contact.approach]
     assert (shallow == 0).all()
     if "load" in control:
-        approach_bound = NormalProblem.assemble(scene, load=contact.load)
-        assert contact.approach <= approach_bound.approach_bound * approach_bound.units.length
+        problem = NormalProblem.assemble(scene, load=contact.load)
+        assert contact.approach <= problem.approach_bound * problem.units.length
     state = cr.shear(contact, force=0.1 * contact.load)
     assert state.certificate.scope == "global"
 
@@ -99,23 +99,23 @@ def test_proof_files(base: Any, geometry: Any) -> None:
 @each_geometry
 def test_gradients(base: Any, geometry: Any) -> None:
     """By heights, tips and positions against differences; forwards the same."""
-    scene, random = on(base, geometry), np.random.default_rng(4)
-    n, step = len(scene), 1e-4
-    dz, dt = 1e-6 * random.standard_normal(n), 1e-2 * random.standard_normal(n)
-    dp = 1e-4 * random.standard_normal((n, 2))
+    scene, random, step = on(base, geometry), np.random.default_rng(4), 1e-4
+    sizes = {"heights": 1e-6, "tip_radii": 1e-2, "positions": 1e-4}
+    steps = {
+        name: size * random.standard_normal(getattr(scene.asperities, name).shape)
+        for name, size in sizes.items()
+    }
 
     def loss(t: float) -> Any:
-        a = scene.asperities
-        moved = cr.Asperities(a.positions + t * dp, a.tip_radii + t * dt, a.heights + t * dz)
-        contact = cr.press(replace(scene, asperities=moved), load=3e-7)
+        contact = cr.press(stepped(scene, t, steps), load=3e-7)
         return contact, cr.cycle(contact, maximum=3e-8)
 
     contact, cycle = loss(0.0)
-    gradient, direction = cycle.gradient(), cr.Direction(heights=dz, tip_radii=dt, positions=dp)
-    slope = float(gradient.heights @ dz + gradient.tip_radii @ dt + (gradient.positions * dp).sum())
+    gradient = cycle.gradient()
+    slope = sum((getattr(gradient, name) * each).sum() for name, each in steps.items())
     (above, top), (below, bottom) = loss(step), loss(-step)
     assert slope == pytest.approx((top.loss - bottom.loss) / (2 * step), rel=1e-4)
-    forwards = contact.change(direction).approach
+    forwards = contact.change(cr.Direction(**steps)).approach
     assert forwards == pytest.approx((above.approach - below.approach) / (2 * step), rel=1e-5)
     assert gradient.sphere_radius is None
     assert np.isfinite(gradient.height_errors).all()

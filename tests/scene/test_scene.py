@@ -1,5 +1,6 @@
 """Material, asperities, scene: geometry by independent means, two bodies, and bad values."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from scenes import MATERIAL, paper
+from scenes import MATERIAL, hexagonal, paper
 
 import convexrough as cr
 from convexrough.scene.asperities import CUT_DEVIATIONS, largest_tip_radius
@@ -16,11 +17,6 @@ from convexrough.vector_shear.problem import FrictionProblem
 
 STEEL, ALUMINIUM = cr.Material.from_youngs(210e9, 0.3), cr.Material.from_youngs(70e9, 0.33)
 BODIES = st.builds(cr.Material.from_youngs, st.floats(1e-3, 1e12), st.floats(0.0, 0.5))
-
-
-def pressed(material: cr.Material, load: float) -> cr.Contact:
-    scene = cr.Scene(1.0, paper().asperities, material, friction=0.5, geometry="summit")
-    return cr.press(scene, load=load)
 
 
 @given(BODIES)
@@ -50,15 +46,15 @@ def _constants(*bodies: cr.Material) -> tuple[Any, Any, Any]:
 
 def test_tangential_kernel_is_the_sum_of_both_bodies() -> None:
     """Cerruti: [(1 - nu) + nu cos^2] / (2 pi G r) of each body."""
-    contact = pressed(cr.Material.pair(STEEL, ALUMINIUM), load=2e4)
+    pair = cr.Material.pair(STEEL, ALUMINIUM)
+    contact = cr.press(replace(paper(), material=pair, friction=0.5), load=2e4)
     problem = contact.cached(FrictionProblem)
     _, G, nu = _constants(STEEL, ALUMINIUM)
     apart = np.subtract(*contact.scene.contact_points[problem.touching[[3, 17]]])
     r = np.hypot(*apart)
     cosine = apart[0] / r
     along = (((1 - nu) + nu * cosine**2) / (2 * np.pi * G * r)).sum()
-    units = problem.units
-    ratio = mindlin.ratio(contact.scene.material.poisson_ratio) * units.length / units.force
+    ratio = mindlin.ratio(pair.poisson_ratio) * problem.units.length / problem.units.force
     assert ratio * problem.kernel[2 * 3, 2 * 17] == pytest.approx(along, rel=1e-13)
 
 
@@ -95,8 +91,7 @@ def square(**options: Any) -> cr.Asperities:
 
 def fine() -> cr.Scene:
     """Memory is asked for so many before it is taken."""
-    asperities = cr.Asperities.hexagonal(spacing=2e-5, tip_radius=1e-4, within=0.0102)
-    return cr.Scene(1.0, asperities, MATERIAL, geometry="summit")
+    return hexagonal(spacing=2e-5, tip_radius=1e-4)
 
 
 def one(radius: float = 1.0, **options: Any) -> cr.Scene:

@@ -10,24 +10,13 @@ from scenes import NAMED, PAPER_APPROACH, hexagonal, paper, prescribed
 
 import convexrough as cr
 from convexrough.normal.problem import NormalProblem
-from convexrough.solvers import (
-    BristleQP,
-    Conic,
-    ConicCVXPY,
-    Newton,
-    Solution,
-    TooDenseError,
-)
+from convexrough.solvers import BristleQP, Conic, ConicCVXPY, Newton, Solution, TooDenseError
 from convexrough.solvers.conic import ConeBoxes, LiftedProgram, solve_in
 from convexrough.solvers.programs import ProgramAnswer
 
-SOLVERS = [Conic(), ConicCVXPY()]
-OTHERS = [ConicCVXPY(solver=name) for name in ("SCS", "QOCO")]
-CONTROLS = ["approach", "load"]
-
-
-def by_name(value: Any) -> str:
-    return value.name if hasattr(value, "name") else str(value)
+SOLVERS = [Conic(), ConicCVXPY(), ConicCVXPY(solver="QOCO")]  # SCS takes many steps
+each_solver = pytest.mark.parametrize("solver", SOLVERS, ids=lambda solver: solver.name)
+each_control = pytest.mark.parametrize("control", ["approach", "load"])
 
 
 def problem_of(scene: cr.Scene, approach: float, control: str = "approach") -> NormalProblem:
@@ -40,8 +29,8 @@ def disagreement(found: Solution, expected: Solution) -> float:
 
 
 @pytest.mark.sample(2)
-@pytest.mark.parametrize("solver", [*SOLVERS, OTHERS[1]], ids=by_name)  # SCS takes many steps
-@pytest.mark.parametrize("control", CONTROLS)
+@each_solver
+@each_control
 def test_five_cones_where_four_do_not_reach(solver: Any, control: str) -> None:
     """Blunt asperities, of which one or more are between S = 21/25 and 1."""
     scene = hexagonal(tip_radius=0.35)
@@ -54,7 +43,7 @@ def test_five_cones_where_four_do_not_reach(solver: Any, control: str) -> None:
         solve_in(solver, problem, four)
     assert disagreement(solver.solve(problem), expected) < 1e-12
     raw = replace(solver, newton_step=False)
-    accepted = 1e-6 if solver in SOLVERS else 10 * np.sqrt(raw.tolerance)  # what its page promises
+    accepted = 1e-6 if solver in SOLVERS[:2] else 10 * np.sqrt(raw.tolerance)  # of its page
     assert disagreement(raw.solve(problem), expected) < accepted
     contact = cr.press(scene, approach=PAPER_APPROACH, solver=solver)
     assert contact.certificate.scope == "local"
@@ -62,8 +51,8 @@ def test_five_cones_where_four_do_not_reach(solver: Any, control: str) -> None:
 
 
 @pytest.mark.sample(2)
-@pytest.mark.parametrize("solver", [*SOLVERS, OTHERS[1]], ids=by_name)
-@pytest.mark.parametrize("control", CONTROLS)
+@each_solver
+@each_control
 def test_too_dense_is_refused(solver: Any, control: str) -> None:
     """The refusal names exactly the asperities that Newton's method finds beyond the range."""
     scene = hexagonal(tip_radius=0.6)
@@ -125,20 +114,15 @@ def test_too_large_for_memory(monkeypatch: pytest.MonkeyPatch) -> None:
         LiftedProgram.assemble(problem, boxes)
 
 
-def errors(scene: cr.Scene, given: dict[str, float], solver: BristleQP) -> Any:
-    """(n,) errors of the loads over the largest load."""
-    found, true = cr.press(scene, **given, solver=solver), cr.press(scene, **given)
-    return (found.loads - true.loads) / true.loads.max()
-
-
 @pytest.mark.sample(2)
-@pytest.mark.parametrize("control", CONTROLS)
+@each_control
 @pytest.mark.parametrize("name", ["rough", "rough, closest"])
 def test_second_order(name: str, control: str) -> None:
-    scene, approach = NAMED[name]
-    given, counts = prescribed(scene, approach, control), np.array([16, 32, 64, 128])
-    found = [errors(scene, given, BristleQP(int(m), newton_step=False)) for m in counts]
-    assert all(np.abs(e).max() < 0.65 / m**2 for m, e in zip(counts, found, strict=True))
-    mean_square = [np.sqrt(np.mean(e**2)) for e in found]
+    problem, counts = problem_of(*NAMED[name], control), np.array([16, 32, 64, 128])
+    true = Newton().solve(problem).loads
+    found = [BristleQP(int(m), newton_step=False).solve(problem).loads for m in counts]
+    errors = (np.array(found) - true) / true.max()
+    assert (np.abs(errors).max(axis=1) < 0.65 / counts**2).all()
+    mean_square = np.sqrt(np.mean(errors**2, axis=1))
     order = -np.polyfit(np.log(counts), np.log(mean_square), 1)[0]
     assert order == pytest.approx(2.0, abs=0.15)

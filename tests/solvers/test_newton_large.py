@@ -1,13 +1,12 @@
 """Thousands of asperities on a lattice: the same answers as through the matrix, in few products."""
 
 from dataclasses import replace
-from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scenes import MATERIAL, PAPER_APPROACH
+from scenes import PAPER_APPROACH, hexagonal, prescribed
 
 import convexrough as cr
 from convexrough.influence import Kind
@@ -15,14 +14,9 @@ from convexrough.normal.problem import NormalProblem
 from convexrough.solvers.newton import ALL_ITERATED
 
 
-def scene(
-    k: float, *, pattern: str = "hexagonal", geometry: Any = "summit", **rough: Any
-) -> cr.Scene:
+def scene(k: float, within: float = 0.01, **rough: Any) -> cr.Scene:
     """The paper's sphere on a lattice k times finer, of tips k times smaller."""
-    make = cr.Asperities.hexagonal if pattern == "hexagonal" else cr.Asperities.square
-    options = {"within": 0.01, **rough}
-    asperities = make(spacing=0.0025 / k, tip_radius=0.02 / k, **options)
-    return cr.Scene(1.0, asperities, MATERIAL, geometry=geometry)
+    return hexagonal(0.0025 / k, 0.02 / k, within, **rough)
 
 
 def edited(
@@ -30,8 +24,7 @@ def edited(
 ) -> cr.Scene:
     """Some of the asperities, moved sideways and up."""
     a = whole.asperities
-    heights = a.heights + raised
-    some = cr.Asperities(a.positions[kept] + shift, a.tip_radii[kept], heights[kept])
+    some = cr.Asperities(a.positions[kept] + shift, a.tip_radii[kept], (a.heights + raised)[kept])
     return replace(whole, asperities=some)
 
 
@@ -45,31 +38,22 @@ def sparse(whole: cr.Scene) -> cr.Scene:
     return edited(whole, kept=near | (rng.random(len(whole)) < 0.6))
 
 
-#: name -> (scene, approach) of 1000 to 3500 candidates, each in the convex range.
-SCENES: dict[str, tuple[cr.Scene, float]] = {
-    "heights": (scene(6, height_std=1e-7, seed=1), PAPER_APPROACH),
-    "rough": (scene(6, height_std=1e-6, tip_radius_cv=0.1, seed=2), PAPER_APPROACH),
-    "closest": (scene(6, geometry="closest", height_std=1e-6, seed=3), PAPER_APPROACH),
-    "screened": (scene(6, within=0.02, height_std=1e-7, seed=4), PAPER_APPROACH),
-    "hole": (middle_free(scene(7)), PAPER_APPROACH),
-    "sparse": (sparse(scene(7, height_std=1e-7, seed=4)), PAPER_APPROACH),
+def scattered(whole: cr.Scene) -> cr.Scene:
+    shift = np.random.default_rng(6).uniform(-5e-5, 5e-5, (len(whole), 2))
+    return edited(whole, shift=shift)
+
+
+#: Scenes of 1000 to 3500 candidates, each in the convex range.
+SCENES = {
+    "heights": scene(6, height_std=1e-7, seed=1),
+    "rough": scene(6, height_std=1e-6, tip_radius_cv=0.1, seed=2),
+    "closest": replace(scene(6, height_std=1e-6, seed=3), geometry="closest"),
+    "screened": scene(6, within=0.02, height_std=1e-7, seed=4),
+    "hole": middle_free(scene(7)),
+    "sparse": sparse(scene(7, height_std=1e-7, seed=4)),
+    "scattered": scattered(scene(6)),
+    "scattered heights": scattered(scene(6, height_std=1e-6, seed=2)),
 }
-
-
-def scattered(whole: cr.Scene, by: float, seed: int) -> cr.Scene:
-    """Off the lattice, each asperity by at most this."""
-    rng = np.random.default_rng(seed)
-    return edited(whole, shift=rng.uniform(-by, by, (len(whole), 2)))
-
-
-SCENES["scattered"] = (scattered(scene(6), 6e-5, 6), PAPER_APPROACH)
-SCENES["scattered heights"] = (scattered(scene(6, height_std=1e-6, seed=2), 5e-5, 6), 5e-5)
-
-
-@cache
-def dense_answer(name: str) -> cr.Contact:
-    pressed, approach = SCENES[name]
-    return cr.press(pressed, approach=approach, influence="dense")
 
 
 @pytest.mark.sample(1)
@@ -78,16 +62,13 @@ def dense_answer(name: str) -> cr.Contact:
 @pytest.mark.parametrize("name", SCENES)
 def test_as_through_the_matrix(name: str, kind: Kind, control: str) -> None:
     """Loads agree within what is proved of each, and to 1e-12; statuses are the same."""
-    pressed, approach = SCENES[name]
+    pressed = SCENES[name]
     if kind == "lattice" and pressed.lattice is None:
         with pytest.raises(cr.InputError, match="lattice"):
-            cr.press(pressed, approach=approach, influence=kind)
+            cr.press(pressed, approach=PAPER_APPROACH, influence=kind)
         return
-    dense = dense_answer(name)
-    prescribed: Any = {control: getattr(dense, control)}
-    if control == "load":  # the load of `dense` is rounded
-        dense = cr.press(pressed, **prescribed, influence="dense")
-    contact = cr.press(pressed, **prescribed, influence=kind)
+    given = prescribed(pressed, PAPER_APPROACH, control)
+    dense, contact = (cr.press(pressed, **given, influence=each) for each in ("dense", kind))
     assert ALL_ITERATED < contact.candidates < 3500
     assert contact.influence == kind
     assert contact.certificate.all_proved
@@ -100,10 +81,10 @@ def test_as_through_the_matrix(name: str, kind: Kind, control: str) -> None:
     between = np.abs(contact.gaps - dense.gaps)
     assert (between <= contact.certificate.gap_errors + dense.certificate.gap_errors).all()
     assert (contact.status == dense.status).all()
-    assert contact.approach == pytest.approx(approach, rel=1e-12)
+    assert contact.approach == pytest.approx(PAPER_APPROACH, rel=1e-12)
     assert contact.crowding == pytest.approx(dense.crowding, rel=1e-9)
     assert contact.model_error == pytest.approx(dense.model_error, rel=0.03)
-    problem = NormalProblem.assemble(pressed, approach=approach, influence="dense")
+    problem = NormalProblem.assemble(pressed, approach=PAPER_APPROACH, influence="dense")
     loads, reached = contact.loads[problem.candidates], contact.approach / problem.units.length
     assert problem.residual(loads / problem.units.force, reached) <= 1e-12 * reached
 
@@ -121,7 +102,7 @@ def test_those_left_out_at_first_are_found(control: str) -> None:
     known = cr.press(pressed, approach=5e-5, influence="dense")
     assert known.certificate.all_proved
     assert (known.status[peaks] == "contact").any()
-    prescribed: Any = {control: getattr(known, control)}
-    found = cr.press(pressed, **prescribed, influence="lattice")
+    given: Any = {control: getattr(known, control)}
+    found = cr.press(pressed, **given, influence="lattice")
     assert found.candidates > ALL_ITERATED
     assert_allclose(found.loads, known.loads, rtol=0, atol=1e-12 * known.loads.max())

@@ -6,13 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from friction_scenes import FRICTION, VECTOR_FRACTIONS, found, lengths, pressed
+from friction_scenes import FRICTION, VECTOR_FRACTIONS, found, lengths, pressed, with_friction
 from numpy.testing import assert_allclose
-from scenes import PAPER_APPROACH
+from scenes import PAPER_APPROACH, hexagonal
 
 import convexrough as cr
 from convexrough import FrictionConic, shear_vector
-from convexrough.solvers.programs import RawAnswer
 from convexrough.vector_shear import cones
 from convexrough.vector_shear.problem import FrictionProblem
 
@@ -29,19 +28,15 @@ def test_cones_and_newton_agree(nu: float, fraction: float) -> None:
     # What Clarabel leaves of the total moves X by more, the nearer gross sliding is.
     tolerance = 1e-10 if 0.6 < fraction < 0.9 else 1e-7 if fraction < 0.99 else 1e-6
     assert lengths(newton.slips - conic.slips).max() < tolerance * travel
-    tolerance = max(tolerance, 1e-7)
-    assert_allclose(
-        newton.displacement, conic.displacement, rtol=tolerance, atol=tolerance * travel
-    )
+    within = dict(rtol=max(tolerance, 1e-7), atol=max(tolerance, 1e-7) * travel)
+    assert_allclose(newton.displacement, conic.displacement, **within)
     assert (newton.status == conic.status).all()
-    assert newton.solver == "newton"
-    assert conic.solver == "conic"
+    assert (newton.solver, conic.solver) == ("newton", "conic")
 
 
 @cache
 def blunt(tip_radius: float) -> cr.Contact:
-    lattice = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=tip_radius, within=0.0102)
-    scene = cr.Scene(1.0, lattice, cr.Material(1.0, 0.5), FRICTION, geometry="summit")
+    scene = with_friction(hexagonal(tip_radius=tip_radius), nu=0.5)
     return cr.press(scene, approach=PAPER_APPROACH)
 
 
@@ -73,12 +68,10 @@ def test_too_dense_for_a_convex_program() -> None:
     assert numbers[worst[0]] == numbers.max()
 
 
-def test_an_answer_is_judged_and_not_the_word_of_its_solver(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_an_answer_is_judged_and_not_the_word_of_its_solver(monkeypatch: Any) -> None:
     honest = cones.run_clarabel
 
-    def boastful(*arguments: Any, **settings: Any) -> RawAnswer:
+    def boastful(*arguments: Any, **settings: Any) -> Any:
         raw = honest(*arguments, **settings)
         return raw._replace(x=1.01 * raw.x, status="Solved")
 

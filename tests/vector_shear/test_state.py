@@ -51,10 +51,9 @@ def test_the_error_of_the_papers_assumption(
     assert (state.status == "sliding").sum() == sliding
     assert state.certificate.all_proved
     assert state.iterations <= 6
-    scalar = cr.shear(contact, force=state.force[0])
-    difference = state.forces - np.column_stack((scalar.forces, 0 * scalar.forces))
-    norm = float(np.sqrt((difference**2).sum() / (scalar.forces**2).sum()))
-    assert state.disagreement == pytest.approx(norm, rel=1e-9)
+    scalar = cr.shear(contact, force=state.force[0]).forces
+    off = np.linalg.norm(state.forces - np.outer(scalar, [1, 0])) / np.linalg.norm(scalar)
+    assert state.disagreement == pytest.approx(off, rel=1e-9)
 
 
 @pytest.mark.sample(2)
@@ -66,9 +65,8 @@ def test_close_to_gross_sliding(fraction: float, nu: float) -> None:
     assert state.residual < 1e-10
     if fraction >= 0.9999:
         assert (lengths(state.slips) > 0).sum() == 37
-        statuses = state.status[state.contact.loads > 0]
-        assert not (statuses == "partial").any()
-        assert (statuses == "sliding").sum() >= 30
+        assert not (state.status == "partial").any()
+        assert (state.status == "sliding").sum() >= 30
     if fraction == 1 - 1e-9:
         farther = found("paper", nu, 1 - 1e-11)
         ratio = farther.displacement[0] / state.displacement[0]
