@@ -204,9 +204,9 @@ def test_slopes(kind: str, layout: str, seed: int) -> None:
         assert errors.max() <= limit * top or layout == "coincident"
 
 
-@pytest.mark.parametrize("family", ["hexagonal", "square"])
-def test_slopes_on_lattices_that_are_made(family: str) -> None:
-    """Points are on their sites up to rounding, so that transforms cause most of the bound."""
+@pytest.mark.parametrize(("family", "most"), [("hexagonal", 2e-14), ("square", 1e-15)])
+def test_slopes_on_lattices_that_are_made(family: str, most: float) -> None:
+    """Points are on their sites, those of the hexagonal lattice up to rounding."""
     rng = np.random.default_rng(0)
     array = getattr(cr.Asperities, family)(spacing=1.0, tip_radius=1.0, within=20.0)
     scene = cr.Scene(1e3, array, cr.Material(1.0, 0.3), geometry="summit")
@@ -217,6 +217,7 @@ def test_slopes_on_lattices_that_are_made(family: str) -> None:
             true = pulled(A.points, load, i, A.scale)
             off = [abs(float(arb(x) - y)) for x, y in zip(found[i], true, strict=True)]
             assert (np.array(off) <= errors[i]).all()
+        assert errors.max() <= most * (A.scale * A.falloff(np.abs(load), 2)).max()
 
 
 @pytest.mark.parametrize("name", BASES)
