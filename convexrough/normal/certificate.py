@@ -225,20 +225,23 @@ def certificate_of(level: Level, loads: Array, start: Trial) -> Certificate:
             in_the_way=frozen(problem.candidates[which]),
             obstacle=reason,
         )
+    # These two need most memory, so they come first.
+    possible, crowding, cover = _other_solutions(level, box)
+    energy = _energy_error(level, box, start, moved)
     load_errors = loads.copy()  # the bound for an asperity that cannot touch
-    rounding = np.abs(loads[problem.candidates] - scaled * force)
-    load_errors[problem.candidates] = _apart(scaled, level) * force + rounding
-    off = level.indentation.error if here else (level.indentation - known.value).size
-    errors = problem.to_scene(off)
+    load_errors[problem.candidates] -= scaled * force
+    np.abs(load_errors, out=load_errors)
+    load_errors[problem.candidates] += _apart(scaled, level) * force
+    errors = problem.to_scene(
+        level.indentation.error if here else (level.indentation - known.value).size
+    )
     errors[others] = errors_beyond
     errors *= 1 + SAFETY
     codes = np.where(indentation < -errors, np.int8(OPEN), np.int8(0))
     codes[others[below]] = OPEN
     codes[problem.candidates[level.touching]] = TOUCHING
     codes[problem.candidates[level.open]] = OPEN
-    energy = _energy_error(level, box, start, moved)
     energy += _screened_energy(problem, loads, indentation, errors)
-    possible, crowding, cover = _other_solutions(level, box)
     return Certificate(
         scope="local" if possible else "global",
         convexity_number=box.convexity_number,
