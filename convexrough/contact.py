@@ -27,7 +27,7 @@ from convexrough.normal.level import Level
 from convexrough.normal.levels import Levels
 from convexrough.normal.problem import ALL_SHARP, NormalProblem
 from convexrough.normal.proved import proved
-from convexrough.normal.refine import refined_loads
+from convexrough.normal.refine import Trial, refined_loads
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
 from convexrough.record import Along, Table
@@ -304,11 +304,12 @@ def levels_of(contact: Contact) -> Levels:
     assert top.trial is not None
     loads = top.trial.loads.high
 
-    def pressed(at_load: NormalProblem, start: Array | None) -> Array:
+    def pressed(at_load: NormalProblem, start: Array | None) -> tuple[Array, Trial | None]:
         try:
-            return solver.solve(at_load, start).loads
+            found = solver.solve(at_load, start)
         except SolverError:  # happens if contacts are crowded
-            return solver.solve(at_load, loads).loads
+            found = solver.solve(at_load, loads)
+        return found.loads, found.trial
 
     return Levels(top, pressed, together=isinstance(solver, solvers.Newton))
 

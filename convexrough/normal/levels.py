@@ -20,7 +20,7 @@ from convexrough.normal.law import Pressed, on_hertz_pressure
 from convexrough.normal.level import Level
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.proved import proved, solution_in
-from convexrough.normal.refine import defect_of, refined_loads, rounding_of
+from convexrough.normal.refine import Trial, defect_of, refined_loads, rounding_of
 from convexrough.normal.stack import Stack
 from convexrough.progress import LOGGER
 from convexrough.roundoff import ROUNDOFF
@@ -40,8 +40,9 @@ NEGLIGIBLE = 88 * ROUNDOFF
 #: once, so this limits the memory.
 NUMBERS = 2**17
 
-#: A function of a problem and initial loads (or None) that returns loads, all in scaled units.
-Press = Callable[[NormalProblem, Array | None], Array]
+#: A function of a sharp problem and initial loads (or None) that returns loads, all in scaled
+#: units, and these loads to more digits, or None.
+Press = Callable[[NormalProblem, Array | None], tuple[Array, Trial | None]]
 
 
 class Levels:
@@ -106,7 +107,8 @@ class Levels:
         from_top = None if box is None or trial is None else trial.loads.high
 
         def sought(start: Array | None) -> Level:
-            state = refined_loads(problem, self._press(problem, start))
+            loads, trial = self._press(problem, start)
+            state = trial or refined_loads(problem, loads)
             return proved(problem, state, box and box.closed(problem))
 
         if box is not None and box.scope == "local":

@@ -14,7 +14,7 @@ conditions are the contact law, with the gaps g:
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any, Self
 
@@ -69,6 +69,8 @@ class NormalProblem:
     control: Ball  # the prescribed load if `by_load` is True, else the prescribed approach D0
     by_load: bool
     highest: float  # bound on D0 at any solution; if infinite, `approach_bound` computes one
+    #: True if loads are refined to as many digits as friction needs
+    sharp: bool = field(default=False, kw_only=True)
 
     def __post_init__(self) -> None:
         # A solver, which may be any class, gets these arrays, and later the proof uses them.
@@ -104,17 +106,17 @@ class NormalProblem:
         return None if self.by_load else _numbers(self.control)
 
     def at_load(self, load: Ball) -> Self:
-        """The problem of the same asperities under a total load, by which the approach must be at
-        most `approach_bound`.
+        """The sharp problem of the same asperities under a total load, by which the approach must
+        be at most `approach_bound`.
         """
         return self._at(load, by_load=True)
 
     def at_approach(self, approach: Ball) -> Self:
-        """The problem of the same asperities at an approach of at most `approach_bound`."""
+        """The sharp problem of the same asperities at an approach of at most `approach_bound`."""
         return self._at(approach, by_load=False)
 
     def _at(self, control: Ball, by_load: bool) -> Self:
-        other = replace(self, control=control, by_load=by_load)
+        other = replace(self, control=control, by_load=by_load, sharp=True)
         for name in ("exact", "row_norm", "largest_entry"):
             other.__dict__[name] = getattr(self, name)
         if "squares" in self.__dict__:
@@ -149,9 +151,12 @@ class NormalProblem:
         return Ball.around(product, errors * (1 + SAFETY))
 
     def pressed_product(self, loads: Pair) -> Ball:
-        """(n,) A P for loads P >= 0, precise enough for a press: fewer digits than `product` on
-        large lattices and, for a matrix of more than `ALL_SHARP` rows, where loads are 0.
+        """(n,) A P for loads P >= 0, precise enough for a press: unless the problem is `sharp`,
+        fewer digits than `product` on large lattices and, for a matrix of more than `ALL_SHARP`
+        rows, where loads are 0.
         """
+        if self.sharp:
+            return self.product(loads)
         if isinstance(self.influence, LatticeInfluence):
             sums = self.influence.sums(loads, self.influence.least_slices)
             return sums * self.exact.scale
