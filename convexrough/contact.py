@@ -25,9 +25,9 @@ from convexrough.normal.certificate import Certificate, certificate_of, certify_
 from convexrough.normal.exact import Units
 from convexrough.normal.level import Level
 from convexrough.normal.levels import Levels
-from convexrough.normal.problem import ALL_SHARP, NormalProblem
+from convexrough.normal.problem import NormalProblem
 from convexrough.normal.proved import proved
-from convexrough.normal.refine import Trial, refined_loads
+from convexrough.normal.refine import Trial, refined_loads, sharpened
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
 from convexrough.record import Along, Table
@@ -44,6 +44,9 @@ FEW = 128
 #: A summit counts as beside a contact disc up to this multiple of the contact radius from the
 #: centre. There the displacements by a point force are 5 % too small, at the rim of the disc 15 %.
 BESIDE = 1.5
+
+#: A contact of at most this many asperities that can touch keeps what friction needs of its press.
+MOST_KEPT = 2**16
 
 if TYPE_CHECKING:
     from convexrough.gradients.change import ContactChange, Direction
@@ -301,8 +304,13 @@ def levels_of(contact: Contact) -> Levels:
         problem = assembled(solver, contact.scene, approach, load, contact.influence)
         given = contact.loads[problem.candidates] / problem.units.force
         top = proved(problem, refined_loads(problem, given))
-    assert top.trial is not None
-    loads = top.trial.loads.high
+    state = top.trial
+    assert state is not None
+    if not top.problem.precise:
+        problem = top.problem.sharpened()
+        state = sharpened(problem, state)
+        top = proved(problem, state, top.box)
+    loads = state.loads.high
 
     def pressed(at_load: NormalProblem, start: Array | None) -> tuple[Array, Trial | None]:
         try:
@@ -355,7 +363,7 @@ def _contact(
             assert state is not None
             level = proved(problem, state)
             certificate = certificate_of(level, loads, state)
-            top = level if problem.influence.stored and len(problem) <= ALL_SHARP else None
+            top = level if len(problem) <= MOST_KEPT else None
         else:
             certificate = certify_on(problem, loads)
     said = isinstance(solver, solvers.Newton) or solver.name.endswith("Newton step")

@@ -269,12 +269,16 @@ class LatticeInfluence(coupling.Influence):
         """The number of slices that a press needs."""
         return SLICES + int(math.prod(self.box.shape) > LARGE)
 
+    @property
+    def slices(self) -> int:
+        """The number of slices that friction needs."""
+        return SLICES + sum(math.prod(self.box.shape) > many for many in MANY)
+
     def sums(self, loads: Pair, slices: int | None = None) -> Ball:
         """(n,) sums over j of P_j / r_ij, from slices (docs/theory/operators-lattice.md, "Slices").
-
-        The default is 3 slices, and more for many sites: as many as friction needs.
+        Their default number is that for friction.
         """
-        slices = slices or SLICES + sum(math.prod(self.box.shape) > many for many in MANY)
+        slices = slices or self.slices
         box, places = self._boxed_for(np.asarray(loads.high))
         off_sites = self._off_sites(np.asarray(loads.high), box, places)
         sliced = self._on(box, slices, lambda: self._slice(box, slices))

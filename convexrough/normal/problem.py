@@ -111,6 +111,10 @@ class NormalProblem:
         """
         return self._at(load, by_load=True)
 
+    def sharpened(self) -> Self:
+        """The same problem, `sharp`."""
+        return self._at(self.control, self.by_load)
+
     def at_approach(self, approach: Ball) -> Self:
         """The sharp problem of the same asperities at an approach of at most `approach_bound`."""
         return self._at(approach, by_load=False)
@@ -150,18 +154,25 @@ class NormalProblem:
         errors = off.of(product) + (off.relative + 2 * ROUNDOFF) * most
         return Ball.around(product, errors * (1 + SAFETY))
 
+    @property
+    def precise(self) -> bool:
+        """True if a press refines loads to as many digits as friction needs."""
+        A = self.influence
+        if self.sharp or not isinstance(A, LatticeInfluence | DenseInfluence):
+            return True
+        few = len(self) <= ALL_SHARP
+        return A.slices == A.least_slices if isinstance(A, LatticeInfluence) else few
+
     def pressed_product(self, loads: Pair) -> Ball:
-        """(n,) A P for loads P >= 0, precise enough for a press: unless the problem is `sharp`,
-        fewer digits than `product` on large lattices and, for a matrix of more than `ALL_SHARP`
-        rows, where loads are 0.
+        """(n,) A P for loads P >= 0, precise enough for a press: unless the problem is `precise`,
+        fewer digits than `product` on a lattice and, for a matrix, where loads are 0.
         """
-        if self.sharp:
+        if self.precise:
             return self.product(loads)
         if isinstance(self.influence, LatticeInfluence):
             sums = self.influence.sums(loads, self.influence.least_slices)
             return sums * self.exact.scale
-        if len(self) <= ALL_SHARP or not isinstance(self.influence, DenseInfluence):
-            return self.product(loads)
+        assert isinstance(self.influence, DenseInfluence)
         found, some, every = self.plain_product(loads), loads.high.nonzero()[0], self.influence.sums
         matrix = MatrixSums(every.points.at(some), every.point_error)
         exact = matrix(loads.at(some)) * self.exact.scale

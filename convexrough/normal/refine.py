@@ -137,6 +137,12 @@ def refined_loads(problem: NormalProblem, loads: Array, product: Product | None 
     return refined(problem, trial_of(problem, loads, product, roughly=True))
 
 
+def sharpened(problem: NormalProblem, state: Trial) -> Trial:
+    """The refined trial that starts from the loads of another trial, with all their digits."""
+    loads, missing = completed(problem, state.loads, roughly=True)
+    return refined(problem, trial(problem, loads, missing, problem.product(loads)))
+
+
 def trial_of(
     problem: NormalProblem, loads: Array, product: Product | None = None, *, roughly: bool = False
 ) -> Trial:
