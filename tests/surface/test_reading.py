@@ -219,11 +219,8 @@ WRONG: list[tuple[str, dict[str, Any], str]] = [
     ("Height [nm]\n@", ONE, r"comments: found Height \[nm\], expected "),
     ("0.5 1.5 no 2.5\n@", ONE, "row 1: found 0.5 1.5 no 2.5, expected 9 heights, as in row 2, or"),
     (f"{KEYENCE}{matrix(separator=',')}", ONE, 'row 3: found "Horizontal","9", .*delete the lines'),
-    (
-        "step 0.5\nNODATA_value -9999\n@",
-        ONE,
-        "row 1: found step 0.5, .* reverse the rows.* --pixel",
-    ),
+    ("step 0.5\nNODATA_value -9999\n@", ONE,
+     "row 1: found step 0.5, .* reverse the rows.* --pixel"),
     (ESRI.replace("7", "8"), {}, "header: found ncols 9, nrows 8, .*expected nrows 7 and ncols 9"),
     (ESRI.replace("cellsize 2.5\n", ""), ONE, "header: .*, cellsize or dx and dy, each once"),
     (ESRI.replace("cellsize 2.5\n", "dx 1\n"), ONE, "header: .*, cellsize or dx and dy, each once"),
@@ -231,21 +228,15 @@ WRONG: list[tuple[str, dict[str, Any], str]] = [
     (f"# Width: 9 m\n# Height: 7 m\n{ESRI}", {}, "header: found width, height, ncols"),
     (ESRI, {"pixel": 2.0}, "pixel: found 2 by 2, expected 2.5 by 2.5, as the file states"),
     ("-0,359,-0,042,0,100\n" * 3, ONE, "rows: found up to 6 parts between commas, expected num"),
-    (
-        "% x y z in mm\n0 0 1\n1 0 2\n0 1 1\n1 1 1\n",
-        {},
-        r'"x \[µm\] y \[µm\] z \[nm\]" above columns',
-    ),
+    ("% x y z in mm\n0 0 1\n1 0 2\n0 1 1\n1 1 1\n", {},
+     r'"x \[µm\] y \[µm\] z \[nm\]" above columns'),
     ("@", {}, "pixel: found none, expected its size, which the file does not state"),
     (matrix(HOLED), ONE, r"found 7 holes \(nan\) in 63 pixels, .*fill=True, --fill"),
     (matrix(np.full((7, 9), np.nan)), ONE | {"fill": True}, "expected some heights"),
     (matrix(np.ones((7, 9))), ONE, "found 1 everywhere, expected a rough surface"),
     (matrix(1e9 * HEIGHTS), ONE, "rms slope .* give height_unit"),
-    (
-        "@",
-        ONE | {"unit": "nm", "height_unit": "um"},
-        "rms slope .* check height_unit, µm, and unit",
-    ),
+    ("@", ONE | {"unit": "nm", "height_unit": "um"},
+     "rms slope .* check height_unit, µm, and unit"),
     ("@", {"pixel": (1.0, 1.0, 1.0)}, "found 3 numbers"),
     ("# x y quality\n0,0,1\n1,0,2\n", ONE, "columns: found x, y, quality, expected a column"),
     (INDEXED, ONE, "columns: found 4 columns without a header, two of which are coordinates"),
@@ -284,7 +275,7 @@ WRONG: list[tuple[str, dict[str, Any], str]] = [
     (THOUSANDS.replace("1,0", "1,000,0"), ONE, "row 1: found 1,000,003, expected"),
     (THOUSANDS.replace(",", "'"), ONE, "row 1: found 1'003, expected numbers w"),
     (" ".join((*matrix().split(" ")[:-1], "-1.#IND")), ONE, "found '-1.#IND'"),
-]
+]  # fmt: skip
 
 
 @pytest.mark.sample(10)
