@@ -21,21 +21,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 import matplotlib
-from scene_files import scene_text
+from scene_files import FRICTION, HEXAGONAL, STAGES, scene_text
 
 from convexrough import cli
 
-STAGES = """
-[friction]
-coefficient = 0.5
-[shear]
-fractions = [0.25, 0.5]
-[cycle]
-maximum_fraction = [0.3]
-loop_points = 40
-[history]
-fractions = [0.3, -0.3, 0.1]
-"""
 RUN = ["run", "new.toml", "--out", "out", "--html", "--proof"]
 
 #: Commands, all of which write to the folder out.
@@ -92,9 +81,10 @@ def _command(seed: int) -> str:
 
 def prepare(folder: Path) -> None:
     """What commands read; the loads are those that they would be."""
-    layout = 'pattern = "hexagonal"\nspacing = 0.0025\ntip_radius = 0.02\nwithin = 0.003'
-    (folder / "new.toml").write_text(scene_text(layout, "approach = 2e-5", STAGES))
-    (folder / "old.toml").write_text(scene_text(layout, "approach = 1e-5", STAGES))
+    for name, approach in (("new", "2e-5"), ("old", "1e-5")):
+        layout, more = f"{HEXAGONAL}within = 0.003", FRICTION + STAGES
+        text = scene_text(layout, f"approach = {approach}", more)
+        (folder / f"{name}.toml").write_text(text)
     (folder / "loads.csv").write_text("load\n" + "1e-9\n" * 7)
     (folder / "said").touch()  # a process may be killed before it says anything
     (folder / "out").mkdir()

@@ -27,7 +27,7 @@ import numpy as np
 import psutil
 import pyarrow
 from pyarrow import parquet
-from scene_files import scene_text
+from scene_files import FRICTION, STAGES, scene_text
 
 import convexrough as cr
 from convexrough import cli
@@ -51,16 +51,6 @@ LONG = 100_000_000
 
 POINTS = [(0.0, 0.0), (0.0025, 0.0), (-0.0025, 0.0), (0.0, 0.003), (0.001, -0.003)]
 X, Y = map(list, zip(*POINTS, strict=True))
-FRICTION = "[friction]\ncoefficient = 0.5\n"
-STAGES = """
-[shear]
-fractions = [0.25, 0.5]
-[cycle]
-maximum_fraction = [0.3]
-loop_points = 8
-[history]
-fractions = [0.3, -0.3, 0.1]
-"""
 PATHS = """
 [path]
 loads = [1.0, 0.5]

@@ -29,7 +29,19 @@ hardness = 8e3
 youngs_modulus = 70e3
 poisson_ratio = 0.33"""
 
-#: Every table that a scene file may have, for the paper's scene.
+#: Some tables, which take no time.
+STAGES = """
+[shear]
+fractions = [0.25, 0.5]
+[cycle]
+maximum_fraction = [0.3]
+loop_points = 40
+[history]
+fractions = [0.3, -0.3, 0.1]
+"""
+
+#: Every table that a scene file may have, for the paper's scene, of this load.
+LOAD = 3.6085338874666633e-07
 EVERYTHING = f"""{FRICTION}
 [shear]
 fractions = [0.1, 0.37, 0.5]
@@ -41,13 +53,13 @@ fractions = [0.6, -0.2, 0.3, -0.6, 0.6]
 [path]
 loads = [0.6, 0.6, 1.0, 1.0]
 forces = [0.0, 0.15, 0.15, -0.075]
-reference = 3.6085338874666633e-07
+reference = {LOAD}
 [steady]
 ellipse = {{ load = 0.7, load_amplitude = 0.28, force_amplitude = 0.175, chords = 12 }}
-reference = 3.6085338874666633e-07
+reference = {LOAD}
 phases = [0.5]
 [shakedown]
-load = 3.6085338874666633e-07
+load = {LOAD}
 force_amplitudes = [1.8042669437333e-07, -1.8042669437333e-07]
 [gradient]
 of = "loss"

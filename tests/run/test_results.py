@@ -1,4 +1,7 @@
-"""Results on disk: complete files and folders, earlier runs, where results are from; warnings."""
+"""Results on disk: complete files and folders, earlier runs, where results are from; warnings.
+
+And how outside programs read them: names of files, columns, and keys.
+"""
 
 import hashlib
 import json
@@ -7,11 +10,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scene_files import FRICTION, HEXAGONAL, scene_text
+from scene_files import EVERYTHING, FRICTION, HEXAGONAL, WITHIN, rows, scene_text
 
 import convexrough as cr
+from convexrough import plots
 from convexrough.atomic import replacing
-from convexrough.run.results import MANIFEST, results_folder
+from convexrough.run.results import MANIFEST, Writer, results_folder
+
+GOLDEN = Path(__file__).parents[1] / "golden" / "folder.json"
 
 
 def test_a_file_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
@@ -108,6 +114,43 @@ def test_a_folder_says_where_its_results_are_from(run: Any) -> None:
     assert said["inputs"] == {"a.toml": digest}
     assert (said["seed"], said["version"]) == (7, cr.__version__)
     assert said["versions"]["numpy"] == np.__version__
+
+
+def keys(value: Any) -> Any:
+    """The keys of objects; of a list those of its first element; of a number or a word nothing."""
+    if isinstance(value, dict):
+        return {key: keys(each) for key, each in value.items()}
+    return [keys(value[0])] if isinstance(value, list) and value else None
+
+
+def test_names_columns_and_keys(command: Any, tmp_path: Path, monkeypatch: Any) -> None:
+    """All is solved before the first file is written."""
+    (tmp_path / "a.toml").write_text(scene_text(WITHIN, more=EVERYTHING))
+    monkeypatch.setattr(plots, "save", lambda figure, path, *_: path.touch())
+    with monkeypatch.context() as patch:
+        first = Writer.summary
+
+        def after(*given: Any) -> None:
+            for solves in ("normal.problem.NormalProblem.assemble", "normal.levels.Levels.at",
+                           "friction.levels.FrictionLevels.rows"):  # fmt: skip
+                patch.setattr(f"convexrough.{solves}", None)  # not to be called
+            first(*given)
+
+        patch.setattr(Writer, "summary", after)
+        ran = command("run", "a.toml", "--out", "out", "--html")
+    assert (ran.status, ran.err) == (0, "")
+    files = {path.name: path for path in Path("out").iterdir()}
+    found: dict[str, Any] = {"files": sorted(files)}
+    found |= {name: list(rows(path)[0]) for name, path in files.items() if name.endswith(".csv")}
+    for name in ("summary.json", "files.json"):
+        found[name] = keys(json.loads(files[name].read_text()))
+    loads = "out/asperities.csv"
+    claim = ("--shear", "forces.csv", "--shear-force", "0", "--out", "verdict", "--json")
+    (tmp_path / "forces.csv").write_text("force\n" + "0\n" * 61)
+    found["verify"] = keys(json.loads(command("verify", "a.toml", loads, *claim).out))
+    found["compare"] = keys(json.loads(command("compare", "a.toml", "--json").out))
+    (tmp_path / "found.json").write_text(json.dumps(found, indent=1))
+    assert found == json.loads(GOLDEN.read_text())
 
 
 # Plausibility: a warning with its numbers, never an error.
