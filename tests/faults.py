@@ -18,7 +18,6 @@ import tempfile
 import time
 from collections import Counter
 from pathlib import Path
-from typing import NamedTuple
 
 import matplotlib
 from scene_files import FRICTION, HEXAGONAL, STAGES, scene_text
@@ -44,17 +43,10 @@ FAULTS = ("kill", "interrupt", "full", "twice", "kill, again")
 UNFINISHED = re.compile(r"\.(.+)\.(\d+)\.unfinished")
 
 
-class Trial(NamedTuple):
-    """What was tried, and what fell: "" where all is well."""
-
-    seed: int
-    how: str
-    status: int | None
-    fault: str
-
-
-def trial(seed: int, durations: dict[str, float], finished: dict[str, dict[str, bytes]]) -> Trial:
-    """The one of this number, in a folder of its own."""
+def trial(
+    seed: int, durations: dict[str, float], finished: dict[str, dict[str, bytes]]
+) -> tuple[str, str, int, str]:
+    """In a folder of its own: the command, its fault, its status, and what fell, "" if nothing."""
     rng = random.Random(seed)
     name = _command(seed)
     fault = FAULTS[seed // len(COMMANDS) % len(FAULTS)]
@@ -72,7 +64,7 @@ def trial(seed: int, durations: dict[str, float], finished: dict[str, dict[str, 
     allowed = (130, -signal.SIGKILL, 0, 2, 3)
     if not what and (status not in allowed or "Traceback" in said):
         what = f"status {status}: {said[-600:]}"
-    return Trial(seed, f"{name}, {fault}{', --force' if force else ''}", status, what)
+    return name, fault, status, what
 
 
 def _command(seed: int) -> str:
@@ -220,8 +212,9 @@ if __name__ == "__main__":
     seeds = list(map(int, sys.argv[1:]))
     durations, finished = undisturbed({_command(seed) for seed in seeds})
     seen: Counter[str] = Counter()
-    for done in (trial(seed, durations, finished) for seed in seeds):
-        seen[f"{done.how.split(', ', 1)[1].replace(', --force', '')}: {done.status}"] += 1
-        if done.fault:
-            print(json.dumps(done._asdict()), flush=True)
+    for seed in seeds:
+        name, fault, status, what = trial(seed, durations, finished)
+        seen[f"{fault}: {status}"] += 1
+        if what:
+            print(json.dumps([seed, name, fault, status, what]), flush=True)
     print(json.dumps(seen))

@@ -270,18 +270,8 @@ class Hang(BaseException):
 # Running them -------------------------------------------------------------------------------------
 
 
-class Ran(NamedTuple):
-    """What became of a mutant; `fault` is "" where all is well."""
-
-    seed: int
-    how: str
-    status: int | None
-    fault: str
-
-
-def run(seed: int) -> Ran:
-    """In a folder of its own, in this process."""
-    made = mutant(seed)
+def run(made: Mutant) -> tuple[int | None, str]:
+    """Its status, in a folder of its own and in this process; and its fault, "" if all is well."""
     size = sum(map(len, made.files.values()))
     with tempfile.TemporaryDirectory() as name, contextlib.chdir(name):
         for path, contents in made.files.items():
@@ -294,7 +284,7 @@ def run(seed: int) -> Ran:
         fault = f"status {status}: {said[:200]!r}"
     if not fault and len(said) > 20_000 and "--json" not in made.arguments:
         fault = f"{len(said)} characters: {said[:200]!r}"
-    return Ran(seed, made.how, status, fault)
+    return status, fault
 
 
 def _called(made: Mutant, size: int) -> tuple[int | None, str, str]:
@@ -339,7 +329,7 @@ def limited() -> None:
     signal.signal(signal.SIGPROF, too_long)
     warnings.simplefilter("error")
     for seed in range(6):  # what is imported, and kept, when first used
-        run(seed)
+        run(mutant(seed))
     held = psutil.Process().memory_info().vms
     most = held + AVAILABLE + 2 * SPARE + 12 * LONG
     resource.setrlimit(resource.RLIMIT_AS, (most, most))
@@ -349,8 +339,9 @@ def limited() -> None:
 if __name__ == "__main__":
     limited()
     seen: Counter[str] = Counter()
-    for ran in map(run, range(int(sys.argv[1]), int(sys.argv[2]))):
-        seen[f"status {ran.status}"] += 1
-        if ran.fault:
-            print(json.dumps(ran._asdict()), flush=True)
+    for seed in range(int(sys.argv[1]), int(sys.argv[2])):
+        status, fault = run(made := mutant(seed))
+        seen[f"status {status}"] += 1
+        if fault:
+            print(json.dumps([seed, made.how, status, fault]), flush=True)
     print(json.dumps(seen))
