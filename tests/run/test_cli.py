@@ -64,7 +64,8 @@ def test_nothing_touches(command: Any, tmp_path: Path) -> None:
     assert outcome.status == 0
     normal = json.loads(outcome.out)["normal"]
     assert (normal["contact"], normal["open"], normal["load"]) == (0, 1, 0.0)
-    assert command("verify", "a.toml", "a-results/asperities.csv").status == 0
+    verified = command("verify", "a.toml", "a-results/asperities.csv", "--json")
+    assert (verified.status, json.loads(verified.out)["verdict"]["error"]) == (0, 0.0)
 
 
 #: Summits so close that both may touch, but at no least of the energy.
