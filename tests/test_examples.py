@@ -17,12 +17,9 @@ TOLERANCES = {
     "design_a_damper": 1e-3, "scatter_of_heights": 0.1,
 }  # fmt: skip
 
-
-#: All `compare()` at their end.
-SCRIPTS = sorted(FOLDER.glob("*.py"))
-
-#: These assert what they say on the way.
-LESSONS = sorted(FOLDER.glob("course/[01]*.py"))
+#: All `compare()` at their end; but lessons assert what they say on the way.
+SCRIPTS = {path.stem: path for path in sorted(FOLDER.glob("*.py"))}
+LESSONS = {path.stem: path for path in sorted(FOLDER.glob("course/[01]*.py"))}
 
 
 @pytest.fixture(autouse=True)
@@ -43,25 +40,21 @@ def load(path: Path) -> dict[str, Any]:
 
 
 @pytest.mark.sample(1)
-@pytest.mark.parametrize(
-    "path",
-    [path for path in SCRIPTS if path.stem not in ("boundary_elements", "measured_surface")],
-    ids=lambda path: path.stem,
-)
-def test_example(path: Path) -> None:
-    pairs = load(path)["compare"]()
+@pytest.mark.parametrize("script", sorted({*SCRIPTS} - {"boundary_elements", "measured_surface"}))
+def test_example(script: str) -> None:
+    pairs = load(SCRIPTS[script])["compare"]()
     assert pairs
     for name, computed, reference in pairs:
-        tolerance = TOLERANCES.get(path.stem, 1e-9)
+        tolerance = TOLERANCES.get(script, 1e-9)
         assert computed == pytest.approx(reference, rel=tolerance, abs=1e-12), name
 
 
 @pytest.mark.sample(1)
-@pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
-def test_lesson(path: Path, shown: list[int]) -> None:
+@pytest.mark.parametrize("script", LESSONS)
+def test_lesson(script: str, shown: list[int]) -> None:
     """Every claim holds, and a class that runs the script sees its picture in large letters."""
-    lesson = load(path)
-    assert path.read_text("utf-8").count("\nassert ") > 5
+    lesson = load(LESSONS[script])
+    assert LESSONS[script].read_text("utf-8").count("\nassert ") > 5
     assert shown == plt.get_fignums() == [1]
     assert plt.rcParams["font.size"] >= 14
     assert min(text.get_fontsize() for text in plt.figure(1).findobj(Text) if text.get_text()) > 10

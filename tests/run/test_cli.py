@@ -68,14 +68,11 @@ def test_nothing_touches(command: Any, tmp_path: Path) -> None:
     assert (verified.status, json.loads(verified.out)["verdict"]["error"]) == (0, 0.0)
 
 
-#: Summits so close that both may touch, but at no least of the energy.
-TWINS = "x,y\n-5e-5,0\n5e-5,0\n"
-
-
 def test_without_a_certificate(run: Any, command: Any) -> None:
-    """Two summits that are almost one: nothing is proved, and everything says so."""
-    Path("summits.csv").write_text(TWINS)
-    outcome = run(scene_text(SUMMITS, "load = 6.6e-8"), "--json")
+    """Two summits so close that nothing is proved, and everything says so."""
+    Path("summits.csv").write_text("x,y\n-5e-5,0\n5e-5,0\n")
+    summits = 'pattern = "file"\npath = "summits.csv"\ntip_radius = 0.02'
+    outcome = run(scene_text(summits, "load = 6.6e-8"), "--json")
     assert outcome.status == 3
     normal = json.loads(outcome.out)["normal"]
     proof = normal["certificate"]
@@ -160,28 +157,16 @@ def test_a_run_says_what_the_package_says(run: Any, command: Any) -> None:
     assert printed.count("those of 12 chords; the loss along the ellipse differs: use") == 1
 
 
-SWEEP = """
-[sweep]
-measure = ["load"]
-[sweep.over]
-"normal.approach" = [3e-5, 5e-5]
-"""
-
-
 @pytest.mark.usefixtures("no_processes")
 def test_a_file_with_a_sweep_is_swept(run: Any, command: Any) -> None:
-    ran = run(scene_text(more=SWEEP), "--json")
+    sweep = '[sweep]\nmeasure = ["load"]\nover = {"normal.approach" = [3e-5, 5e-5]}'
+    ran = run(scene_text(more=sweep), "--json")
     assert (ran.status, json.loads(ran.out)["sweep"]["certified"]) == (0, 2)
     found = cr.open_sweep("a-sweep").read()["load"]
     Path("one.toml").write_text(scene_text())
     assert found[1] == read_scene("one.toml").press().load
     assert command("run", "a.toml", "--html").refuses("of one scene, not of a sweep")
     assert "[sweep]: only `convexrough sweep`" in command("compare", "a.toml").err
-
-
-# Bad input
-
-SUMMITS = 'pattern = "file"\npath = "summits.csv"\ntip_radius = 0.02'
 
 
 def test_usage_errors(command: Any) -> None:
