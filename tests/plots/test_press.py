@@ -10,20 +10,18 @@ import pytest
 from figure_checks import fits
 from matplotlib.figure import Figure
 from numpy.testing import assert_allclose
-from scenes import MATERIAL, PAPER_APPROACH, paper, rough, steel
+from scenes import PAPER_APPROACH, hexagonal, on_sphere, paper, rough, steel
 
 import convexrough as cr
 from convexrough import fields, plots
 
 
 def few(*points: tuple[float, float]) -> cr.Contact:
-    scene = cr.Scene(1.0, cr.Asperities(points, 0.02), MATERIAL, geometry="summit")
-    return cr.press(scene, approach=PAPER_APPROACH)
+    return cr.press(on_sphere(points), approach=PAPER_APPROACH)
 
 
 def dense(spacing: float) -> cr.Contact:
-    asperities = cr.Asperities.hexagonal(spacing=spacing, tip_radius=8 * spacing, within=8.5e-3)
-    return cr.press(cr.Scene(1.0, asperities, MATERIAL, geometry="summit"), load=4.5e-7)
+    return cr.press(hexagonal(spacing, tip_radius=8 * spacing, within=8.5e-3), load=4.5e-7)
 
 
 CASES: dict[str, Callable[[], cr.Contact]] = {

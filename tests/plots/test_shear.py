@@ -10,7 +10,7 @@ from figure_checks import discs, fits, texts
 from matplotlib.colors import to_rgba
 from numpy.testing import assert_allclose
 from path_scenes import LARGEST, ONE, PAPER, follow
-from scenes import MATERIAL, PAPER_APPROACH, paper, rough
+from scenes import PAPER_APPROACH, on_sphere, paper, rough
 
 import convexrough as cr
 from convexrough import plots
@@ -19,12 +19,7 @@ from convexrough.paper.figures import paper_figures
 from convexrough.plots.asperity_map import LOOKS, SLIDING
 from convexrough.sphere.smooth import smooth
 
-SCENES = {
-    "paper": paper(),
-    "rough": rough(),
-    "one": cr.Scene(1.0, cr.Asperities([[0.0, 0.0]], 0.02), MATERIAL, geometry="summit"),
-    "nothing": paper(),
-}
+SCENES = {"paper": paper(), "rough": rough(), "one": on_sphere([[0.0, 0.0]]), "nothing": paper()}
 
 
 @cache

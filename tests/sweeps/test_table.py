@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scene_files import scene_text
-from scenes import MATERIAL, hexagonal, paper
+from scenes import hexagonal, paper
 from sweep_files import SMALL, numbers, same, sweeping, swept, tables, toml
 
 import convexrough as cr
@@ -116,8 +116,7 @@ def test_rows_together_are_those_of_scenes_one_by_one(cycle: dict[str, list[floa
 
 
 def test_scenes_made_in_python() -> None:
-    base = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
-    scenes = [cr.Scene(R, base, MATERIAL, 0.5, geometry="summit") for R in (0.9, 1.0, 1.1)]
+    scenes = [replace(paper(), sphere_radius=R, friction=0.5) for R in (0.9, 1.0, 1.1)]
     loads = [1e-7, 2e-7, 3e-7]
     table = swept(scenes, load=loads, cycle=[0.3], measure=["approach", "loss"])
     assert table.columns[1:5] == ["normal.load", "seed", "status", "message"]
