@@ -39,9 +39,8 @@ def test_command(command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     ran = command("bench", "--quick", "--json")
     assert (ran.status, ran.err) == (0, "")
     folder = tmp_path / "bench-results"
-    assert {path.name for path in folder.iterdir()} == {
-        *("files.json", "bench.json", "rows.csv", "work-precision.png", "cost.png")
-    }
+    written = {path.name for path in folder.iterdir()}
+    assert written == {"files.json", "bench.json", "rows.csv", "work-precision.png", "cost.png"}
     assert len(rows(folder / "rows.csv")) == len(made.rows)
     summary = json.loads(ran.out)
     assert summary == json.loads((folder / "bench.json").read_text())

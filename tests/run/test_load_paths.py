@@ -34,10 +34,8 @@ def test_nothing_is_proved_where_order_fails(run: Any, command: Any, monkeypatch
     for stage in ("path", "steady", "shakedown"):
         assert summary[stage]["order"] == "fails"
     for stage in ("shear", "cycle", "history", "path", "steady", "shakedown"):
-        assert (
-            "not proved: that indentations increase with the load, "
-            f"which the proof of [{stage}] needs" in outcome.err
-        )
+        said = "not proved: that indentations increase with the load, which the proof of "
+        assert f"{said}[{stage}] needs" in outcome.err
     assert summary["steady"]["loss_error"] is None
     assert summary["steady"]["undecided"] > 0
     assert summary["shakedown"]["proved"] is False
@@ -76,10 +74,8 @@ def test_an_array_for_the_largest_load_of_a_path(read: Any) -> None:
     """The pattern is wide enough for loads above that of [normal]; too narrow ones are told."""
     path = FRICTION + "[path]\nloads = [1.2e-6, 1.2e-6]\nforces = [0.0, 1e-7]\n"
 
-    def run(
-        within: str, normal: str = "load = 3e-8", radius: str = "1.0"
-    ) -> tuple[cr.Contact, Any, list[str]]:
-        scene = read(HEXAGONAL + within, normal, path, radius)
+    def run(within: str, load: str = "3e-8", radius: str = "1.0") -> tuple[cr.Contact, Any, Any]:
+        scene = read(HEXAGONAL + within, f"load = {load}", path, radius)
         contact = scene.press()
         return contact, scene.compute(contact)[1].found[0], list(scene.cautions(contact))
 
@@ -91,7 +87,7 @@ def test_an_array_for_the_largest_load_of_a_path(read: Any) -> None:
     assert [each for each in narrow if "under the loads of [path] contact reaches the rim" in each]
     long = "within = 0.0102\nheight_std = 2e-6\nseed = 3"
     for load, ended in (("1e-9", True), ("1e-7", False)):  # at 1e-7 [normal] has warned of it
-        *_, said = run(long, f"load = {load}", "[inf, 1.0]")
+        *_, said = run(long, load, "[inf, 1.0]")
         assert any(each.startswith("under the loads of [path]") for each in said) == ended
 
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scene_files import EVERYTHING, FRICTION, HEXAGONAL, WITHIN, rows, scene_text
+from scenes import MATERIAL, hexagonal
 
 import convexrough as cr
 from convexrough import plots
@@ -170,10 +171,8 @@ def test_contact_beyond_the_sphere(run: Any, command: Any) -> None:
 
 def test_an_array_that_ends_inside_the_contact_is_told() -> None:
     """By contact at the rim, as with a radius in the wrong unit, or where all asperities touch."""
-    wide, few, seven, one = (
-        cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=within)
-        for within in (0.0102, 0.0045, 0.004, 0.002)
-    )
+    within = (0.0102, 0.0045, 0.004, 0.002)
+    wide, few, seven, one = (hexagonal(within=each).asperities for each in within)
     rim = "contact reaches the rim of the array, which is at 0."
     sites = 1e-3 * np.stack(np.meshgrid(*2 * [np.arange(-7, 8)]), axis=-1).reshape(-1, 2)
     square, corner = cr.Asperities(sites, 0.02), cr.Asperities(wide.positions + 0.0102, 0.02)
@@ -195,6 +194,6 @@ def test_an_array_that_ends_inside_the_contact_is_told() -> None:
         (corner, (1.0, np.inf), {"load": 3.6e-7}, "axis of the sphere, at x = 0 and y = 0"),
         (corner, np.inf, {"load": 3.6e-7}, ""),
     ):
-        contact = cr.press(cr.Scene(base, array, cr.Material(1.0, 0.3)), **control)
+        contact = cr.press(cr.Scene(base, array, MATERIAL), **control)
         assert bool(contact.warnings) == bool(told)
         assert told in " ".join(contact.warnings)

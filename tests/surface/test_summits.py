@@ -1,5 +1,7 @@
 """Summits: hills and their prominences, fitted tips, asperities, and Gaussian statistics."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -56,12 +58,10 @@ def test_the_map_has_the_moments_of_its_spectrum() -> None:
 
 def test_summits_are_as_a_gaussian_surface_has_them() -> None:
     """Density, curvature and heights of all maxima against Nayak's theory."""
-    options = dict(hurst=0.8, rms_slope=0.1, rolloff=64.0, pixels=512, cutoff=16.0)
-    exact = cr.surface.self_affine_moments(**options)  # type: ignore[arg-type]
-    found = [
-        cr.surface.self_affine(seed=seed, **options).summits(0.0).statistics  # type: ignore[arg-type]
-        for seed in range(12)
-    ]
+    options: Any = dict(hurst=0.8, rms_slope=0.1, rolloff=64.0, pixels=512, cutoff=16.0)
+    exact = cr.surface.self_affine_moments(**options)
+    maps = [cr.surface.self_affine(seed=seed, **options) for seed in range(12)]
+    found = [each.summits(0.0).statistics for each in maps]
     density, curvature, height, spread = np.mean(found, axis=0)
     assert_allclose(density, exact.density, rtol=0.02)
     assert_allclose(curvature, exact.mean_curvature, rtol=0.04)
@@ -82,10 +82,8 @@ def test_round_tops_are_round_in_spite_of_rounding() -> None:
 
 def around(heights: Map, place: Place) -> list[Place]:
     """The pixel and its up to eight neighbours."""
-    ranges = [
-        range(max(i - 1, 0), min(i + 2, n)) for i, n in zip(place, heights.shape, strict=True)
-    ]
-    return [(i, j) for i in ranges[0] for j in ranges[1]]
+    rows, columns = (range(max(i - 1, 0), i + 2) for i in place)
+    return [(i, j) for i in rows for j in columns if i < heights.shape[0] and j < heights.shape[1]]
 
 
 def wolf(heights: Map) -> dict[Place, float]:

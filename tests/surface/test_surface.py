@@ -85,9 +85,8 @@ def test_a_trend_that_explains_most_is_named() -> None:
         (-ball, "sphere"),
     ):
         surface = cr.surface.Surface(trend + NOISE, PIXEL)
-        assert f'explains 100 % of the variance of the heights: detrend="{kind}"' in str(
-            surface.warnings
-        )
+        said = f'explains 100 % of the variance of the heights: detrend="{kind}"'
+        assert said in str(surface.warnings)
         assert "warning" in repr(surface)
         assert surface.detrend(kind).warnings == ()
     assert surface.detrend("plane").warnings[0].startswith("a sphere of radius -2")

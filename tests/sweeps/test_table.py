@@ -61,9 +61,7 @@ def test_rows_are_those_of_single_scenes() -> None:
         contact = cr.press(scene, load=rows["normal.load"][i])
         P, proof = 0.5 * contact.load, contact.certificate
         first, second = cr.cycles(contact, P * np.array([0.37, 0.5]), P * np.array([-0.37, 0.1]))
-        loads, forces = cr.elliptic_path(
-            load=3e-7, load_amplitude=5e-8, force_amplitude=4e-8, friction=0.5
-        )
+        loads, forces = cr.elliptic_path(**ALL["steady"]["ellipse"], friction=0.5)
         closed = cr.steady(scene, loads=loads, forces=forces)
         expected = {
             "contact": (contact.status == "contact").sum(),

@@ -590,17 +590,14 @@ def test_a_pressure_implies_the_unit_of_force(units: str) -> None:
         ("youngs_modulus = 210e9", 'length = "mm"\nforce = "N"', "which is 2.1e+17 Pa, expected"),
         (f"{STEEL}\nhardness = 2e15", METRES, "[material] hardness: found 2e+15 N/m², which is 2e"),
         (BODIES, METRES, "[material.base] youngs_modulus: found 70 N/m², which is 70 Pa, expected"),
-        (
-            "youngs_modulus = 210",
-            'length = "um"\nforce = "N"\npressure = "GPa"',
-            "found N, expected mN, the force of GPa and um",
-        ),
+        ("youngs_modulus = 210", 'length = "um"\nforce = "N"\npressure = "GPa"',
+         "found N, expected mN, the force of GPa and um"),
         (STEEL, 'length = "MM"\nforce = "N"', 'expected a unit of length; did you mean "mm"?'),
         (STEEL, 'length = "N"', "length: found N, a unit of force, expected a unit of length"),
         (STEEL, 'length = "m"\nconvert = true\nforce = "furlong"', "force: found 'furlong'"),
         ("E = 210e9", METRES, 'E: unknown key, did you mean "youngs_modulus"?'),
     ],
-)
+)  # fmt: skip
 def test_units_of_scenes(case: Case, modulus: str, units: str, said: str) -> None:
     write_scene(modulus, units)
     assert case.command("run", "scene.toml", "--no-figures").refuses(said)
