@@ -165,10 +165,8 @@ def test_a_file_with_a_sweep_is_swept(run: Any, command: Any) -> None:
 
 
 def test_usage_errors(command: Any) -> None:
-    for line in (
-        "run", "run a.toml --outt x", "walk", "verify a.toml", "run a b",
-        "gallery few --profile --export new",
-    ):  # fmt: skip
+    both = "gallery few --profile --export new"
+    for line in ("run", "run a.toml --outt x", "walk", "verify a.toml", "run a b", both):
         outcome = command(*line.split())
         assert (outcome.status, outcome.out) == (2, ""), line
         assert "Usage: convexrough" in outcome.err

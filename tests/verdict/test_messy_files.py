@@ -482,22 +482,19 @@ def test_positions_of_contact_points(tmp_path: Path) -> None:
     np.testing.assert_array_equal(claimed.values, loads)
 
 
-@pytest.mark.parametrize(
-    ("factor", "shift", "said"),
-    [(1e-3, 0.0, "--scale x=1000 --scale y=1000"), (1.0, 0.02, "shifted by about [0.02, 0], ")],
-)
-def test_headers_of_nodes_at_a_square_lattice(
-    tmp_path: Path, factor: float, shift: float, said: str
-) -> None:
+def test_headers_of_nodes_at_a_square_lattice(tmp_path: Path) -> None:
     """Loads taken as positions fit by chance, so the header must not be blamed first."""
     scene, loads = on_square().scene, on_square().loads
     touched, angles = np.flatnonzero(loads), np.arange(8) * np.pi / 4
     around = 4e-3 * np.column_stack((np.cos(angles), np.sin(angles)))
-    x, y = factor * (scene.contact_points[touched][:, None] + around + [shift, 0]).reshape(-1, 2).T
-    columns = {"x": x, "y": y, "load": np.repeat(115384.6 * loads[touched] / 8, 8)}
-    with pytest.raises(TableError) as refused:
-        read_loads(tmp_path / put(tmp_path, columns), scene, Manner(nodes=True))
-    assert said in str(refused.value)
+    nodes = (scene.contact_points[touched][:, None] + around).reshape(-1, 2)
+    shares = np.repeat(115384.6 * loads[touched] / 8, 8)
+    scales, shifts = "--scale x=1000 --scale y=1000", "shifted by about [0.02, 0], "
+    for moved, said in ((1e-3 * nodes, scales), (np.add(nodes, [0.02, 0]), shifts)):
+        columns = {"x": moved[:, 0], "y": moved[:, 1], "load": shares}
+        with pytest.raises(TableError) as refused:
+            read_loads(tmp_path / put(tmp_path, columns), scene, Manner(nodes=True))
+        assert said in str(refused.value)
 
 
 # Units
@@ -674,14 +671,11 @@ def test_findings_as_junit(case: Case) -> None:
     assert f"rows: found {len(case.loads) - 1}" in said
     assert suite("b.xml")[0][0].get("message") == f"input: {said.splitlines()[0]}"
     assert said in outcome.err
-    for wrong in (
-        ["--junit=b.xml"],
-        ["--nope", "--junit", "b.xml"],
-        ["loads.csv", "--junit", "b.xml", "--explain"],
-    ):  # an earlier report remains only without --force
+    # An earlier report remains only without --force.
+    for wrong in ("--junit=b.xml", "--nope --junit b.xml", "loads.csv --junit b.xml --explain"):
         Path("b.xml").touch()
-        for force in ([], ["--force"]):
-            assert case.command("verify", "scene.toml", *wrong, *force).status == 2
+        for force in ("", "--force"):
+            assert case.command("verify", "scene.toml", *f"{wrong} {force}".split()).status == 2
             assert Path("b.xml").exists() == (not force)
 
 
