@@ -120,12 +120,9 @@ def arrays(record: Any) -> Iterator[np.ndarray[Any, Any]]:
         value = getattr(record, field.name)
         if isinstance(value, np.ndarray):
             yield value
-        elif isinstance(value, Record):
-            yield from arrays(value)
-        elif isinstance(value, tuple):
-            for each in value:
-                if isinstance(each, Record):
-                    yield from arrays(each)
+        for each in value if isinstance(value, tuple) else (value,):
+            if isinstance(each, Record):
+                yield from arrays(each)
 
 
 def test_copies_keep_every_bit_and_what_is_read_only() -> None:
@@ -161,14 +158,13 @@ def columns(result: Any) -> dict[str, np.ndarray[Any, Any]]:
     """Every array that a result says it has, by the name of one value."""
     arrays = result._along.values() if hasattr(result, "_along") else ()
     names = [name for each in arrays for name in each]
-    ones = {name: singular(name) for name in names}
-    return {
-        f"asperity_{one}" if one != name and one in names else one: np.asarray(
-            getattr(result, name)
-        )
-        for name, one in ones.items()
-        if getattr(result, name) is not None
-    }
+    found = {}
+    for name in names:
+        one, values = singular(name), getattr(result, name)
+        both = one != name and one in names
+        if values is not None:
+            found[f"asperity_{one}" if both else one] = np.asarray(values)
+    return found
 
 
 #: What a row of a table is, where it is no asperity.

@@ -24,8 +24,7 @@ def test_the_default_within_loses_no_asperity(
     generous = read(text + "within = 0.05", normal)
     n = len(file.scene)
     assert n < len(generous.scene) / 4
-    same = cr.press(file.scene, approach=file.approach, load=file.load)
-    far = cr.press(generous.scene, approach=file.approach, load=file.load)
+    same, far = file.press(), generous.press()
     assert same.certificate.all_proved
     assert far.certificate.all_proved
     assert np.allclose(far.loads[:n], same.loads, rtol=1e-12, atol=0)
