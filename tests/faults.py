@@ -42,9 +42,11 @@ FAULTS = ("kill", "interrupt", "full", "twice", "kill, again")
 #: What may be left of a file that was being written by a process that was killed.
 UNFINISHED = re.compile(r"\.(.+)\.(\d+)\.unfinished")
 
+Files = dict[str, bytes]
+
 
 def trial(
-    seed: int, durations: dict[str, float], finished: dict[str, dict[str, bytes]]
+    seed: int, durations: dict[str, float], finished: dict[str, Files]
 ) -> tuple[str, str, int, str]:
     """In a folder of its own: the command, its fault, its status, and what fell, "" if nothing."""
     rng = random.Random(seed)
@@ -82,7 +84,7 @@ def prepare(folder: Path) -> None:
     (folder / "out").mkdir()
 
 
-def _earlier(folder: Path, earlier: dict[str, bytes]) -> dict[str, bytes]:
+def _earlier(folder: Path, earlier: Files) -> Files:
     """Results of an earlier run of the same command, and a file of the user."""
     for name, data in earlier.items():
         (folder / "out" / name).write_bytes(data)
@@ -143,18 +145,12 @@ def _forked(folder: Path, arguments: list[str], limit: int | None) -> int:
         os._exit(status)
 
 
-def contents(folder: Path) -> dict[str, bytes]:
+def contents(folder: Path) -> Files:
     """All files of a folder, by name."""
     return {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
 
 
-def _wrong(
-    found: dict[str, bytes],
-    before: dict[str, bytes],
-    finished: dict[str, bytes],
-    fault: str,
-    refused: bool,
-) -> str:
+def _wrong(found: Files, before: Files, finished: Files, fault: str, refused: bool) -> str:
     """What a folder holds that it should not; nothing is touched where another run was refused."""
     for file, data in found.items():
         killed = fault == "kill" or (fault == "kill, again" and refused)
@@ -187,10 +183,10 @@ def _incomplete(name: str, data: bytes, whole: bytes) -> str:
     return "" if data.rstrip(b"\n").endswith(end) else "torn"
 
 
-def undisturbed(names: set[str]) -> tuple[dict[str, float], dict[str, dict[str, bytes]]]:
+def undisturbed(names: set[str]) -> tuple[dict[str, float], dict[str, Files]]:
     """How long these commands take, and what they write; under "old" an earlier run's."""
     durations: dict[str, float] = {}
-    finished: dict[str, dict[str, bytes]] = {}
+    finished: dict[str, Files] = {}
     old = ["run", "old.toml", "--out", "out", "--no-figures"]
     for name in [*names, "old"]:
         with tempfile.TemporaryDirectory() as place, contextlib.chdir(place):
