@@ -27,43 +27,21 @@ import numpy as np
 import psutil
 import pyarrow
 from pyarrow import parquet
-from scene_files import FRICTION, STAGES, scene_text
+from scene_files import EVERYTHING, FRICTION, LOAD, STAGES, scene_text
 
 import convexrough as cr
 from convexrough import cli
 from convexrough.errors import ConvexroughError
 from convexrough.memory import MemoryRise
 
-#: Of processor time for one mutant, and of 100 MB in one.
-SECONDS, LONG_SECONDS = 20, 120
-
-#: Of memory beside what the file itself warrants, and what the machine is said to have.
-SPARE, AVAILABLE = 2**28, 2**29
-
-#: Times the size of a file: what reading it may take.
-WARRANTED = 40
-
-#: Scenes of more asperities are read and not computed.
-MOST_ASPERITIES = 400
-
-#: Of a line that is far too long.
-LONG = 100_000_000
+SECONDS, LONG_SECONDS = 20, 120  # of processor time for one mutant, and of 100 MB in one
+WARRANTED = 40  # times the size of a file: what reading it may take
+SPARE, AVAILABLE = 2**28, 2**29  # of memory beside that, and what the machine is said to have
+MOST_ASPERITIES = 400  # scenes of more are read and not computed
+LONG = 100_000_000  # of a line that is far too long
 
 POINTS = [(0.0, 0.0), (0.0025, 0.0), (-0.0025, 0.0), (0.0, 0.003), (0.001, -0.003)]
 X, Y = map(list, zip(*POINTS, strict=True))
-PATHS = """
-[path]
-loads = [1.0, 0.5]
-forces = [0.0, 0.1]
-reference = 1e-8
-[steady]
-ellipse = {load = 1.0, force_amplitude = 0.1, chords = 12}
-reference = 1e-8
-[shakedown]
-load = 1e-8
-force_amplitudes = [1e-9]
-kind = "elastic"
-"""
 UNITS = '[units]\nlength = "mm"\nforce = "N"\n[solver]\nname = "newton"\n'
 SUMMITS = 'pattern = "file"\npath = "{}"\ntip_radius = 0.02'
 
@@ -123,7 +101,8 @@ def mutant(seed: int) -> Mutant:
 
 
 def _scene(rng: random.Random, summits: str) -> bytes:
-    stages = rng.choice([FRICTION, FRICTION + STAGES, FRICTION + PATHS, UNITS + FRICTION])
+    everything = EVERYTHING.replace(repr(LOAD), "1e-8")
+    stages = rng.choice([FRICTION, FRICTION + STAGES, everything, UNITS + FRICTION])
     normal = rng.choice(["approach = 5e-5", "load = 1e-8"])
     return scene_text(SUMMITS.format(summits), normal, stages).encode()
 
