@@ -16,9 +16,7 @@ import convexrough as cr
 from convexrough import gallery, solvers
 
 NAMES = gallery.names()
-
-#: Of the last of 50 digits.
-UNIT = Fraction(1, 10**49)
+UNIT = Fraction(1, 10**49)  # of the last of 50 digits
 
 #: 64 bristles are off by about 1 / 64^2, which a Newton step squares; the others are nearer.
 SQUARED = 64.0**-4

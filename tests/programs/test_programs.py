@@ -18,10 +18,7 @@ from convexrough.programs import program
 SCENE = hexagonal(within=0.0051)
 CONTACT = cr.press(SCENE, approach=PAPER_APPROACH)
 CONTROLS = {"approach": PAPER_APPROACH, "load": CONTACT.load}
-each_control = pytest.mark.parametrize("control", CONTROLS)
-
-#: 8 bristles: the method of HiGHS is one of active sets, and takes its time with more.
-FEW = 8
+FEW = 8  # bristles: the method of HiGHS is one of active sets, and takes its time with more
 
 
 def energy(control: str) -> float:
@@ -56,7 +53,7 @@ def by_highs(path: Path) -> tuple[Any, Any, float]:
     return solution.col_value, solution.row_dual, highs.getObjectiveValue()
 
 
-@each_control
+@pytest.mark.parametrize("control", CONTROLS)
 @pytest.mark.parametrize(
     ("form", "ending"), [("cones", "npz"), ("dual", "npz"), ("bristles", "mps")]
 )

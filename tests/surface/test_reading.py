@@ -175,20 +175,6 @@ def test_the_only_sheet_with_a_map(tmp_path: Path) -> None:
         raw(path, [INFORMATION, INFORMATION], pixel=1.0)
 
 
-HOLED = np.where(X == Y, np.nan, HEIGHTS)
-ONE = {"pixel": 1.0}
-
-#: Two columns of coordinates and two of values; and a matrix whose rows are numbered.
-INDEXED = "".join(f"{i},{j},{i % 7 + j % 3},5\n" for i in range(9) for j in range(7))
-NUMBERED = "".join(f"{i},{line}\n" for i, line in enumerate(matrix(separator=",").split()))
-
-#: Heights of about 1000, with a comma between groups of three digits.
-THOUSANDS = "1,003;1,021;997;1,040\n" * 10 + "1,011;990;1,007;1,002\n" * 10
-
-#: Heights of which only the largest exceed 999, with a point between its groups of digits.
-FEW_THOUSANDS = "827;12;9;640\n" * 4 + "827;1.013;9;640\n"
-
-
 def test_few_decimals_are_no_thousands(tmp_path: Path) -> None:
     """Not without a whole number of three digits; 999 and more can mark holes."""
     for cells in ("1.125 2 3", "1.125 -999 12.250", "1.125 -9999 120", "1.125 120 0.125"):
@@ -209,6 +195,18 @@ def test_holes_of_whole_rows_and_columns_remain(tmp_path: Path) -> None:
                     assert found.heights.shape == HEIGHTS.shape
                     assert found.filled == (cells == mark).sum()
 
+
+HOLED = np.where(X == Y, np.nan, HEIGHTS)
+ONE = {"pixel": 1.0}
+
+#: Two columns of coordinates and two of values; and a matrix whose rows are numbered.
+INDEXED = "".join(f"{i},{j},{i % 7 + j % 3},5\n" for i in range(9) for j in range(7))
+NUMBERED = "".join(f"{i},{line}\n" for i, line in enumerate(matrix(separator=",").split()))
+
+#: Heights of about 1000, and some of which only the largest exceeds 999, with a mark between groups
+#: of three digits.
+THOUSANDS = "1,003;1,021;997;1,040\n" * 10 + "1,011;990;1,007;1,002\n" * 10
+FEW_THOUSANDS = "827;12;9;640\n" * 4 + "827;1.013;9;640\n"
 
 #: The header of an ESRI grid, with a matrix; and one that is not understood.
 ESRI = "ncols 9\nnrows 7\nxllcorner -3.0\nYLLCENTER 1e3\ncellsize 2.5\nNODATA_value 0\n@"

@@ -376,10 +376,6 @@ REFUSED: dict[str, tuple[Any, ...]] = {
 }  # fmt: skip
 
 
-#: Of which more is said than one cause.
-SEVERAL = ("x in mm", "a row twice", "an index from who knows where")
-
-
 @pytest.mark.sample(8)
 @pytest.mark.parametrize("name", READ)
 def test_read_right(case: Case, name: str) -> None:
@@ -399,7 +395,8 @@ def test_refused_with_the_cause(case: Case, name: str) -> None:
     outcome = case.verify(make(case), *options, name=file)
     assert (outcome.status, outcome.out) == (2, "")
     assert all(cause in outcome.err for cause in causes), outcome.err
-    assert len(outcome.err.splitlines()) <= (11 if name in SEVERAL else 1)
+    several = name in ("x in mm", "a row twice", "an index from who knows where")
+    assert len(outcome.err.splitlines()) <= (11 if several else 1)
 
 
 def test_pressures_at_hexagonal_points(tmp_path: Path) -> None:
