@@ -29,21 +29,18 @@ def solved(seed: int, control: str) -> tuple[cr.Contact, dict[str, float]]:
 def corrupted(contact: cr.Contact, kind: str, rng: Any) -> tuple[Any, set[int]]:
     """Loads with one thing wrong, and who is guilty; nobody where that is not possible."""
     loads, largest = contact.loads.copy(), contact.loads.max()
-    touching, open_ones = np.flatnonzero(loads), np.flatnonzero(loads == 0)
+    among = np.flatnonzero((loads == 0) == (kind == "added"))
+    if len(among) == 0:
+        return loads, set()
+    guilty = rng.choice(among, 2 if kind == "swapped" else 1, replace=False)
     if kind == "added":
-        if len(open_ones) == 0:
-            return loads, set()
-        i = rng.choice(open_ones)
-        loads[i] = largest * 10 ** rng.uniform(-5, 0)
-        return loads, {int(i)}
-    if kind == "swapped":
-        i, j = rng.choice(touching, 2, replace=False)
-        loads[[i, j]] = loads[[j, i]]
-        near = abs(loads[i] - loads[j]) < 1e-9 * largest
-        return loads, set() if near else {int(i), int(j)}
-    i = rng.choice(touching)
-    loads[i] *= 0.0 if kind == "dropped" else 10 ** rng.uniform(-2, 2)
-    return loads, {int(i)}
+        loads[guilty] = largest * 10 ** rng.uniform(-5, 0)
+    elif kind == "swapped":
+        loads[guilty] = loads[guilty[::-1]]
+        guilty = guilty[: 0 if np.ptp(loads[guilty]) < 1e-9 * largest else 2]
+    else:
+        loads[guilty] *= 0.0 if kind == "dropped" else 10 ** rng.uniform(-2, 2)
+    return loads, {*guilty.tolist()}
 
 
 @pytest.mark.sample(4)
