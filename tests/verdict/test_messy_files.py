@@ -180,7 +180,7 @@ READ: dict[str, tuple[Any, ...]] = {
     "units below the header": (
         lambda case: lines(case.table()).replace("load\n", "load\nm,m,N\n", 1),),
     "comments without a factor, and the scene's units": (
-        lambda case: "# run 7, 3 × 4 sites\n# load factor = 1.0\n"
+        lambda case: "# run 7, rows x 4 sites\n# load factor = 1.0\n"
         "# lengths in m, loads in N, E = 210 GPa\n" + lines(case.table()),),
     "vectors of forces, of which the third is named": (
         lambda case: {"F": np.column_stack((case.loads, 0 * case.loads, case.loads))}, "a.mat",
