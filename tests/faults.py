@@ -58,11 +58,13 @@ def trial(
         folder = Path(place)
         prepare(folder)
         earlier = finished["old" if name.startswith("run") else name]
-        before = _earlier(folder, earlier) if force else {}
+        left = {**earlier, "notes.txt": b"mine"} if force else {}  # and a file of the user
+        for file, data in left.items():
+            (folder / "out" / file).write_bytes(data)
         status, said = _tried(folder, arguments, fault, rng, durations[name])
         found = contents(folder / "out")
         refused = status == 2 and name in ("verify", "new")  # what is there already is not theirs
-        what = _wrong(found, before, finished[name], fault, refused)
+        what = _wrong(found, left, finished[name], fault, refused)
     allowed = (130, -signal.SIGKILL, 0, 2, 3)
     if not what and (status not in allowed or "Traceback" in said):
         what = f"status {status}: {said[-600:]}"
@@ -82,14 +84,6 @@ def prepare(folder: Path) -> None:
     (folder / "loads.csv").write_text("load\n" + "1e-9\n" * 7)
     (folder / "said").touch()  # a process may be killed before it says anything
     (folder / "out").mkdir()
-
-
-def _earlier(folder: Path, earlier: Files) -> Files:
-    """Results of an earlier run of the same command, and a file of the user."""
-    for name, data in earlier.items():
-        (folder / "out" / name).write_bytes(data)
-    (folder / "out" / "notes.txt").write_text("mine")
-    return contents(folder / "out")
 
 
 def _tried(

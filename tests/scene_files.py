@@ -2,13 +2,15 @@
 
 import csv
 import gzip
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.io import savemat
+
+import convexrough as cr
 
 Columns = Mapping[str, Iterable[Any]]
 
@@ -103,6 +105,15 @@ def lines(columns: Columns, separator: str = ",", decimal: str = ".", header: bo
     names, *below = cells(columns)
     written = [[str(cell).replace(".", decimal) for cell in row] for row in below]
     return "".join(separator.join(row) + "\n" for row in [*([names] if header else []), *written])
+
+
+def refusal(read: Callable[[Path], Any], path: Path) -> list[str]:
+    """The lines of the message with which a file is refused, each without the path."""
+    with pytest.raises(cr.ConvexroughError) as caught:
+        read(path)
+    said = str(caught.value).split("\n")
+    assert all(line.startswith(f"{path}: ") for line in said)
+    return [line.removeprefix(f"{path}: ") for line in said]
 
 
 def put(folder: Path, made: Any, name: str = "loads.csv") -> str:

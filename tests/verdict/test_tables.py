@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scene_files import cells, put, scene_text
+from scene_files import cells, put, refusal, scene_text
 from scenes import rough
 
 import convexrough as cr
@@ -35,13 +35,7 @@ def read(folder: Path, made: Any, name: str = "loads.csv", scene: cr.Scene = SMA
 
 
 def refused(folder: Path, content: str | bytes) -> list[str]:
-    """The lines of the message, without the path."""
-    path = folder / "loads.csv"
-    with pytest.raises(cr.ConvexroughError) as caught:
-        read(folder, content)
-    said = str(caught.value).splitlines()
-    assert all(line.startswith(f"{path}: ") for line in said)
-    return [line.removeprefix(f"{path}: ") for line in said]
+    return refusal(read_loads, folder / put(folder, content))
 
 
 ROWS = "0,0,1.5\n1,0,0\n0.5,2.5,2.5e-5\n"
