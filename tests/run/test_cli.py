@@ -95,7 +95,6 @@ def test_a_run_says_what_the_package_says(run: Any, command: Any) -> None:
     assert {key: normal[key] for key in counts} == counts
     assert normal["load"] == pytest.approx(3.60853389e-7, rel=1e-8)
     assert (normal["approach"], normal["solver"]) == (5e-5, "newton")
-    assert {"iterations", "seconds", "model_error", "crowding", "approach_error"} < set(normal)
     assert proof["scope"] == "global"
     assert proof["convexity_number"] == pytest.approx(0.504, abs=1e-3)
     assert 0 < proof["load_error"] < 1e-10 * normal["load"]
