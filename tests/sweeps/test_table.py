@@ -84,13 +84,10 @@ def test_rows_are_those_of_single_scenes() -> None:
             assert rows[name][i] == pytest.approx(value, rel=0.0, abs=rounding), name
 
 
-@pytest.mark.parametrize(
-    "cycle",
-    [
-        {"maximum_fraction": [0.37, 1.0], "minimum_fraction": [-0.37, 0.1]},
-        {"displacement": [1e-6, 2e-6]},  # not together
-    ],
-)
+TOGETHER = {"maximum_fraction": [0.37, 1.0], "minimum_fraction": [-0.37, 0.1]}
+
+
+@pytest.mark.parametrize("cycle", [TOGETHER, {"displacement": [1e-6, 2e-6]}])
 def test_rows_together_are_those_of_scenes_one_by_one(cycle: dict[str, list[float]]) -> None:
     """Where only numbers of contacts and cycles are asked for, scenes are computed together."""
     contents = {k: v for k, v in ALL.items() if k not in ("shear", "history", "steady")}
