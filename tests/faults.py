@@ -18,24 +18,12 @@ import tempfile
 import time
 from collections import Counter
 from pathlib import Path
-from typing import NamedTuple
 
 import matplotlib
-from scene_files import scene_text
+from scene_files import FRICTION, HEXAGONAL, STAGES, scene_text
 
 from convexrough import cli
 
-STAGES = """
-[friction]
-coefficient = 0.5
-[shear]
-fractions = [0.25, 0.5]
-[cycle]
-maximum_fraction = [0.3]
-loop_points = 40
-[history]
-fractions = [0.3, -0.3, 0.1]
-"""
 RUN = ["run", "new.toml", "--out", "out", "--html", "--proof"]
 
 #: Commands, all of which write to the folder out.
@@ -54,18 +42,13 @@ FAULTS = ("kill", "interrupt", "full", "twice", "kill, again")
 #: What may be left of a file that was being written by a process that was killed.
 UNFINISHED = re.compile(r"\.(.+)\.(\d+)\.unfinished")
 
-
-class Trial(NamedTuple):
-    """What was tried, and what fell: "" where all is well."""
-
-    seed: int
-    how: str
-    status: int | None
-    fault: str
+Files = dict[str, bytes]
 
 
-def trial(seed: int, durations: dict[str, float], finished: dict[str, dict[str, bytes]]) -> Trial:
-    """The one of this number, in a folder of its own."""
+def trial(
+    seed: int, durations: dict[str, float], finished: dict[str, Files]
+) -> tuple[str, str, int, str]:
+    """In a folder of its own: the command, its fault, its status, and what fell, "" if nothing."""
     rng = random.Random(seed)
     name = _command(seed)
     fault = FAULTS[seed // len(COMMANDS) % len(FAULTS)]
@@ -75,15 +58,17 @@ def trial(seed: int, durations: dict[str, float], finished: dict[str, dict[str, 
         folder = Path(place)
         prepare(folder)
         earlier = finished["old" if name.startswith("run") else name]
-        before = _earlier(folder, earlier) if force else {}
+        left = {**earlier, "notes.txt": b"mine"} if force else {}  # and a file of the user
+        for file, data in left.items():
+            (folder / "out" / file).write_bytes(data)
         status, said = _tried(folder, arguments, fault, rng, durations[name])
         found = contents(folder / "out")
         refused = status == 2 and name in ("verify", "new")  # what is there already is not theirs
-        what = _wrong(found, before, finished[name], fault, refused)
+        what = _wrong(found, left, finished[name], fault, refused)
     allowed = (130, -signal.SIGKILL, 0, 2, 3)
     if not what and (status not in allowed or "Traceback" in said):
         what = f"status {status}: {said[-600:]}"
-    return Trial(seed, f"{name}, {fault}{', --force' if force else ''}", status, what)
+    return name, fault, status, what
 
 
 def _command(seed: int) -> str:
@@ -92,20 +77,13 @@ def _command(seed: int) -> str:
 
 def prepare(folder: Path) -> None:
     """What commands read; the loads are those that they would be."""
-    layout = 'pattern = "hexagonal"\nspacing = 0.0025\ntip_radius = 0.02\nwithin = 0.003'
-    (folder / "new.toml").write_text(scene_text(layout, "approach = 2e-5", STAGES))
-    (folder / "old.toml").write_text(scene_text(layout, "approach = 1e-5", STAGES))
+    for name, approach in (("new", "2e-5"), ("old", "1e-5")):
+        layout, more = f"{HEXAGONAL}within = 0.003", FRICTION + STAGES
+        text = scene_text(layout, f"approach = {approach}", more)
+        (folder / f"{name}.toml").write_text(text)
     (folder / "loads.csv").write_text("load\n" + "1e-9\n" * 7)
     (folder / "said").touch()  # a process may be killed before it says anything
     (folder / "out").mkdir()
-
-
-def _earlier(folder: Path, earlier: dict[str, bytes]) -> dict[str, bytes]:
-    """Results of an earlier run of the same command, and a file of the user."""
-    for name, data in earlier.items():
-        (folder / "out" / name).write_bytes(data)
-    (folder / "out" / "notes.txt").write_text("mine")
-    return contents(folder / "out")
 
 
 def _tried(
@@ -161,18 +139,12 @@ def _forked(folder: Path, arguments: list[str], limit: int | None) -> int:
         os._exit(status)
 
 
-def contents(folder: Path) -> dict[str, bytes]:
+def contents(folder: Path) -> Files:
     """All files of a folder, by name."""
     return {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
 
 
-def _wrong(
-    found: dict[str, bytes],
-    before: dict[str, bytes],
-    finished: dict[str, bytes],
-    fault: str,
-    refused: bool,
-) -> str:
+def _wrong(found: Files, before: Files, finished: Files, fault: str, refused: bool) -> str:
     """What a folder holds that it should not; nothing is touched where another run was refused."""
     for file, data in found.items():
         killed = fault == "kill" or (fault == "kill, again" and refused)
@@ -205,10 +177,10 @@ def _incomplete(name: str, data: bytes, whole: bytes) -> str:
     return "" if data.rstrip(b"\n").endswith(end) else "torn"
 
 
-def undisturbed(names: set[str]) -> tuple[dict[str, float], dict[str, dict[str, bytes]]]:
+def undisturbed(names: set[str]) -> tuple[dict[str, float], dict[str, Files]]:
     """How long these commands take, and what they write; under "old" an earlier run's."""
     durations: dict[str, float] = {}
-    finished: dict[str, dict[str, bytes]] = {}
+    finished: dict[str, Files] = {}
     old = ["run", "old.toml", "--out", "out", "--no-figures"]
     for name in [*names, "old"]:
         with tempfile.TemporaryDirectory() as place, contextlib.chdir(place):
@@ -230,8 +202,9 @@ if __name__ == "__main__":
     seeds = list(map(int, sys.argv[1:]))
     durations, finished = undisturbed({_command(seed) for seed in seeds})
     seen: Counter[str] = Counter()
-    for done in (trial(seed, durations, finished) for seed in seeds):
-        seen[f"{done.how.split(', ', 1)[1].replace(', --force', '')}: {done.status}"] += 1
-        if done.fault:
-            print(json.dumps(done._asdict()), flush=True)
+    for seed in seeds:
+        name, fault, status, what = trial(seed, durations, finished)
+        seen[f"{fault}: {status}"] += 1
+        if what:
+            print(json.dumps([seed, name, fault, status, what]), flush=True)
     print(json.dumps(seen))

@@ -39,8 +39,5 @@ def fits(*figures: Figure) -> None:
 
 def discs(axes: Any, label: str) -> int:
     """How many discs bear this label."""
-    return sum(
-        len(each.get_offsets())
-        for each in axes.collections
-        if isinstance(each, EllipseCollection) and each.get_label() == label
-    )
+    named = [each for each in axes.collections if each.get_label() == label]
+    return sum(len(each.get_offsets()) for each in named if isinstance(each, EllipseCollection))

@@ -27,53 +27,21 @@ import numpy as np
 import psutil
 import pyarrow
 from pyarrow import parquet
-from scene_files import scene_text
+from scene_files import EVERYTHING, FRICTION, LOAD, STAGES, scene_text
 
 import convexrough as cr
 from convexrough import cli
 from convexrough.errors import ConvexroughError
 from convexrough.memory import MemoryRise
 
-#: Of processor time for one mutant, and of 100 MB in one.
-SECONDS, LONG_SECONDS = 20, 120
-
-#: Of memory beside what the file itself warrants, and what the machine is said to have.
-SPARE, AVAILABLE = 2**28, 2**29
-
-#: Times the size of a file: what reading it may take.
-WARRANTED = 40
-
-#: Scenes of more asperities are read and not computed.
-MOST_ASPERITIES = 400
-
-#: Of a line that is far too long.
-LONG = 100_000_000
+SECONDS, LONG_SECONDS = 20, 120  # of processor time for one mutant, and of 100 MB in one
+WARRANTED = 40  # times the size of a file: what reading it may take
+SPARE, AVAILABLE = 2**28, 2**29  # of memory beside that, and what the machine is said to have
+MOST_ASPERITIES = 400  # scenes of more are read and not computed
+LONG = 100_000_000  # of a line that is far too long
 
 POINTS = [(0.0, 0.0), (0.0025, 0.0), (-0.0025, 0.0), (0.0, 0.003), (0.001, -0.003)]
 X, Y = map(list, zip(*POINTS, strict=True))
-FRICTION = "[friction]\ncoefficient = 0.5\n"
-STAGES = """
-[shear]
-fractions = [0.25, 0.5]
-[cycle]
-maximum_fraction = [0.3]
-loop_points = 8
-[history]
-fractions = [0.3, -0.3, 0.1]
-"""
-PATHS = """
-[path]
-loads = [1.0, 0.5]
-forces = [0.0, 0.1]
-reference = 1e-8
-[steady]
-ellipse = {load = 1.0, force_amplitude = 0.1, chords = 12}
-reference = 1e-8
-[shakedown]
-load = 1e-8
-force_amplitudes = [1e-9]
-kind = "elastic"
-"""
 UNITS = '[units]\nlength = "mm"\nforce = "N"\n[solver]\nname = "newton"\n'
 SUMMITS = 'pattern = "file"\npath = "{}"\ntip_radius = 0.02'
 
@@ -133,7 +101,8 @@ def mutant(seed: int) -> Mutant:
 
 
 def _scene(rng: random.Random, summits: str) -> bytes:
-    stages = rng.choice([FRICTION, FRICTION + STAGES, FRICTION + PATHS, UNITS + FRICTION])
+    everything = EVERYTHING.replace(repr(LOAD), "1e-8")
+    stages = rng.choice([FRICTION, FRICTION + STAGES, everything, UNITS + FRICTION])
     normal = rng.choice(["approach = 5e-5", "load = 1e-8"])
     return scene_text(SUMMITS.format(summits), normal, stages).encode()
 
@@ -280,18 +249,8 @@ class Hang(BaseException):
 # Running them -------------------------------------------------------------------------------------
 
 
-class Ran(NamedTuple):
-    """What became of a mutant; `fault` is "" where all is well."""
-
-    seed: int
-    how: str
-    status: int | None
-    fault: str
-
-
-def run(seed: int) -> Ran:
-    """In a folder of its own, in this process."""
-    made = mutant(seed)
+def run(made: Mutant) -> tuple[int | None, str]:
+    """Its status, in a folder of its own and in this process; and its fault, "" if all is well."""
     size = sum(map(len, made.files.values()))
     with tempfile.TemporaryDirectory() as name, contextlib.chdir(name):
         for path, contents in made.files.items():
@@ -304,7 +263,7 @@ def run(seed: int) -> Ran:
         fault = f"status {status}: {said[:200]!r}"
     if not fault and len(said) > 20_000 and "--json" not in made.arguments:
         fault = f"{len(said)} characters: {said[:200]!r}"
-    return Ran(seed, made.how, status, fault)
+    return status, fault
 
 
 def _called(made: Mutant, size: int) -> tuple[int | None, str, str]:
@@ -349,7 +308,7 @@ def limited() -> None:
     signal.signal(signal.SIGPROF, too_long)
     warnings.simplefilter("error")
     for seed in range(6):  # what is imported, and kept, when first used
-        run(seed)
+        run(mutant(seed))
     held = psutil.Process().memory_info().vms
     most = held + AVAILABLE + 2 * SPARE + 12 * LONG
     resource.setrlimit(resource.RLIMIT_AS, (most, most))
@@ -359,8 +318,9 @@ def limited() -> None:
 if __name__ == "__main__":
     limited()
     seen: Counter[str] = Counter()
-    for ran in map(run, range(int(sys.argv[1]), int(sys.argv[2]))):
-        seen[f"status {ran.status}"] += 1
-        if ran.fault:
-            print(json.dumps(ran._asdict()), flush=True)
+    for seed in range(int(sys.argv[1]), int(sys.argv[2])):
+        status, fault = run(made := mutant(seed))
+        seen[f"status {status}"] += 1
+        if fault:
+            print(json.dumps([seed, made.how, status, fault]), flush=True)
     print(json.dumps(seen))

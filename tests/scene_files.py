@@ -2,13 +2,15 @@
 
 import csv
 import gzip
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.io import savemat
+
+import convexrough as cr
 
 Columns = Mapping[str, Iterable[Any]]
 
@@ -29,7 +31,19 @@ hardness = 8e3
 youngs_modulus = 70e3
 poisson_ratio = 0.33"""
 
-#: Every table that a scene file may have, for the paper's scene.
+#: Some tables, which take no time.
+STAGES = """
+[shear]
+fractions = [0.25, 0.5]
+[cycle]
+maximum_fraction = [0.3]
+loop_points = 40
+[history]
+fractions = [0.3, -0.3, 0.1]
+"""
+
+#: Every table that a scene file may have, for the paper's scene, of this load.
+LOAD = 3.6085338874666633e-07
 EVERYTHING = f"""{FRICTION}
 [shear]
 fractions = [0.1, 0.37, 0.5]
@@ -41,13 +55,13 @@ fractions = [0.6, -0.2, 0.3, -0.6, 0.6]
 [path]
 loads = [0.6, 0.6, 1.0, 1.0]
 forces = [0.0, 0.15, 0.15, -0.075]
-reference = 3.6085338874666633e-07
+reference = {LOAD}
 [steady]
 ellipse = {{ load = 0.7, load_amplitude = 0.28, force_amplitude = 0.175, chords = 12 }}
-reference = 3.6085338874666633e-07
+reference = {LOAD}
 phases = [0.5]
 [shakedown]
-load = 3.6085338874666633e-07
+load = {LOAD}
 force_amplitudes = [1.8042669437333e-07, -1.8042669437333e-07]
 [gradient]
 of = "loss"
@@ -91,6 +105,15 @@ def lines(columns: Columns, separator: str = ",", decimal: str = ".", header: bo
     names, *below = cells(columns)
     written = [[str(cell).replace(".", decimal) for cell in row] for row in below]
     return "".join(separator.join(row) + "\n" for row in [*([names] if header else []), *written])
+
+
+def refusal(read: Callable[[Path], Any], path: Path) -> list[str]:
+    """The lines of the message with which a file is refused, each without the path."""
+    with pytest.raises(cr.ConvexroughError) as caught:
+        read(path)
+    said = str(caught.value).split("\n")
+    assert all(line.startswith(f"{path}: ") for line in said)
+    return [line.removeprefix(f"{path}: ") for line in said]
 
 
 def put(folder: Path, made: Any, name: str = "loads.csv") -> str:

@@ -58,12 +58,10 @@ def test_all_agree(name: str, control: str) -> None:
     assert [entry.solver for entry in comparison.entries] == NAMES
     assert comparison.contradictions == ()
     assert comparison.certified
-    limits = dict(
-        zip(NAMES, [0.0, 1e-12, 1e-7, 1e-12, 1e-7, 1e-12, 1e-12, 3e-9, 0.6 / 64**2], strict=True)
-    )
-    for entry in comparison.entries:
+    limits = [0.0, 1e-12, 1e-7, 1e-12, 1e-7, 1e-12, 1e-12, 3e-9, 0.6 / 64**2]
+    for entry, limit in zip(comparison.entries, limits, strict=True):
         assert (entry.outcome, entry.message) == ("answered", "")
-        assert entry.disagreement <= limits[entry.solver], entry.solver
+        assert entry.disagreement <= limit, entry.solver
         assert entry.different_statuses == entry.different_contacts == 0
         assert entry.contact is not None
         assert entry.contact.certificate.all_proved
@@ -77,9 +75,8 @@ def test_solvers_that_are_not_installed_are_left_out(monkeypatch: pytest.MonkeyP
         monkeypatch.setitem(sys.modules, missing, None)
     names = [solver.name for solver in every_solver()]
     assert names == [name for name in NAMES if "(" not in name]
-    (_, asked) = compare(
-        paper(), approach=PAPER_APPROACH, solvers=[ConicCVXPY(solver="SCS")]
-    ).entries
+    few = [ConicCVXPY(solver="SCS")]
+    _, asked = compare(paper(), approach=PAPER_APPROACH, solvers=few).entries
     assert asked.outcome == "failed"
     assert "SCS is not installed; CVXPY finds " in asked.message
     assert asked.message.split("; ")[-1].startswith("pip install scs, or choose one of CLARABEL")
@@ -113,12 +110,9 @@ def test_solvers_that_do_not_answer() -> None:
         assert np.isnan(entry.disagreement)
         assert (entry.contact, entry.different_statuses, entry.memory) == (None, None, None)
     assert answered.outcome == "answered"
-    assert [
-        (entry.outcome, entry.message.partition(" (test_compare.py:")[0]) for entry in wrong
-    ] == [
-        ("failed", "ValueError: boom"),
-        ("failed", "sloppy: returned int, expected a Solution"),
-    ]
+    assert [entry.outcome for entry in wrong] == ["failed"] * 2
+    said = [entry.message.partition(" (test_compare.py:")[0] for entry in wrong]
+    assert said == ["ValueError: boom", "sloppy: returned int, expected a Solution"]
 
 
 # Forged proofs: what a mistake in the mathematics would look like.
@@ -172,10 +166,8 @@ def test_command(command: Any, tmp_path: Path) -> None:
     assert "asperities         37 contact, 24 open\n" in ran.out
     assert "duality gap        in N mm, " in ran.out
     table = ran.out.splitlines()[-len(NAMES) - 1 :]
-    assert table[0].split() == [
-        *("solver", "disagreement", "load", "error", "duality", "gap", "certificate", "statuses"),
-        *("iterations", "seconds", "MB"),
-    ]
+    heads = "solver disagreement load error duality gap certificate statuses iterations seconds MB"
+    assert table[0].split() == heads.split()
     assert len({len(line) for line in table}) == 1
     for name, line in zip(NAMES, table[1:], strict=True):
         assert re.match(rf"{re.escape(name)} +\S+ +\S+ +\S+ +global +same +\d+ +\S+ +\S+$", line)
@@ -193,14 +185,10 @@ def test_command_with_a_log(command: Any, tmp_path: Path) -> None:
     steps = [row.split(",") for row in rows]
     assert list(dict.fromkeys(name for name, *_ in steps)) == ["newton", "conic + Newton step"]
     assert all(np.isfinite([float(number) for number in row]).all() for _, *row in steps)
-    again = command("compare", "a.toml", "--log", "log.csv")
-    assert (again.status, again.out) == (2, "")
-    assert "log.csv: exists already" in again.err
+    assert command("compare", "a.toml", "--log", "log.csv").refuses("log.csv: exists already")
 
 
-def test_command_when_a_solver_fails_and_on_a_contradiction(
-    command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_command_when_a_solver_fails_and_on_a_contradiction(command: Any, monkeypatch: Any) -> None:
     """A contradiction weighs more: here every load of the bristles is called exact."""
 
     def fail(*_: Any, **__: Any) -> None:
@@ -213,7 +201,7 @@ def test_command_when_a_solver_fails_and_on_a_contradiction(
         exact = np.zeros(len(contact.loads))
         return replace(contact, certificate=replace(contact.certificate, load_errors=exact))
 
-    (tmp_path / "a.toml").write_text(scene_text())
+    Path("a.toml").write_text(scene_text())
     with monkeypatch.context() as patch:
         patch.setattr(BristleQP, "solve", fail)
         ran = command("compare", "a.toml")
@@ -327,6 +315,5 @@ def test_a_solver_of_ones_own_by_its_name(command: Any, tmp_path: Path, monkeypa
     assert ran.status == 3
     assert [each["solver"] for each in json.loads(ran.out)["compare"]] == names
     profile = json.loads(command("gallery", "--profile", "few", *both, "--json").out)["profile"]
-    assert [(each["solver"], bool(each["right"])) for each in profile] == [
-        *zip(names, (True, False, True), strict=True)
-    ]
+    assert [each["solver"] for each in profile] == names
+    assert [bool(each["right"]) for each in profile] == [True, False, True]

@@ -9,9 +9,7 @@ before it: `<!-- not run: why -->`.
 import re
 import runpy
 import shlex
-from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
 
@@ -28,19 +26,12 @@ COMMAND = re.compile(r"^\$ (.*?)(?:\s+# exit status (\d))?$", re.M)
 DIRECTIVES = {"{toctree}", "{eval-rst}"}
 
 
-class Block(NamedTuple):
-    language: str
-    text: str
-    why_not: str | None
+def blocks(page: Path) -> list[re.Match[str]]:
+    return list(BLOCK.finditer(page.read_text("utf-8")))
 
 
-def blocks(page: Path) -> Iterator[Block]:
-    for found in BLOCK.finditer(page.read_text("utf-8")):
-        yield Block(found["language"].strip(), found["text"], found["why"])
-
-
-def runs(block: Block) -> bool:
-    return block.why_not is None and block.language not in DIRECTIVES
+def runs(block: re.Match[str]) -> bool:
+    return block["why"] is None and block["language"] not in DIRECTIVES
 
 
 @pytest.mark.usefixtures("no_processes")
@@ -53,7 +44,8 @@ def runs(block: Block) -> bool:
 def test_blocks_run(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {"__name__": "page"}
-    for language, text, _ in filter(runs, blocks(page)):
+    for block in filter(runs, blocks(page)):
+        language, text = block["language"], block["text"]
         if language == "python":
             exec(compile(text, str(page), "exec"), names)
         elif language == "toml":
@@ -94,8 +86,8 @@ def test_every_public_name_is_in_the_reference() -> None:
 
 
 def test_the_readme_shows_what_the_package_computes(capsys: pytest.CaptureFixture[str]) -> None:
-    block = next(block for block in blocks(ROOT / "README.md") if block.language == "python")
-    exec(compile(block.text, "README.md", "exec"), {})
+    first = next(each for each in blocks(ROOT / "README.md") if each["language"] == "python")
+    exec(compile(first["text"], "README.md", "exec"), {})
     printed = capsys.readouterr().out.split("\n")
     assert printed[0].split()[1] == "37"
     assert printed[1].startswith("global")

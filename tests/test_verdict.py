@@ -9,13 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import MATERIAL, PAPER_APPROACH, paper, scattered
+from scenes import MATERIAL, PAPER_APPROACH, hexagonal, paper, scattered
 
 import convexrough as cr
 from convexrough.friction.verdict import verify_shear
 from convexrough.normal.problem import NormalProblem
-
-KINDS = ("dropped", "added", "scaled", "swapped")
 
 
 @cache
@@ -31,27 +29,24 @@ def solved(seed: int, control: str) -> tuple[cr.Contact, dict[str, float]]:
 def corrupted(contact: cr.Contact, kind: str, rng: Any) -> tuple[Any, set[int]]:
     """Loads with one thing wrong, and who is guilty; nobody where that is not possible."""
     loads, largest = contact.loads.copy(), contact.loads.max()
-    touching, open_ones = np.flatnonzero(loads), np.flatnonzero(loads == 0)
+    among = np.flatnonzero((loads == 0) == (kind == "added"))
+    if len(among) == 0:
+        return loads, set()
+    guilty = rng.choice(among, 2 if kind == "swapped" else 1, replace=False)
     if kind == "added":
-        if len(open_ones) == 0:
-            return loads, set()
-        i = rng.choice(open_ones)
-        loads[i] = largest * 10 ** rng.uniform(-5, 0)
-        return loads, {int(i)}
-    if kind == "swapped":
-        i, j = rng.choice(touching, 2, replace=False)
-        loads[[i, j]] = loads[[j, i]]
-        near = abs(loads[i] - loads[j]) < 1e-9 * largest
-        return loads, set() if near else {int(i), int(j)}
-    i = rng.choice(touching)
-    loads[i] *= 0.0 if kind == "dropped" else 10 ** rng.uniform(-2, 2)
-    return loads, {int(i)}
+        loads[guilty] = largest * 10 ** rng.uniform(-5, 0)
+    elif kind == "swapped":
+        loads[guilty] = loads[guilty[::-1]]
+        guilty = guilty[: 0 if np.ptp(loads[guilty]) < 1e-9 * largest else 2]
+    else:
+        loads[guilty] *= 0.0 if kind == "dropped" else 10 ** rng.uniform(-2, 2)
+    return loads, {*guilty.tolist()}
 
 
 @pytest.mark.sample(4)
 @pytest.mark.parametrize("control", ["approach", "load"])
 @pytest.mark.parametrize("seeds", [range(k, k + 5) for k in range(0, 50, 5)], ids=str)
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", ["dropped", "added", "scaled", "swapped"])
 def test_single_corruptions(kind: str, seeds: range, control: str) -> None:
     """Some 1,700 in all: the guilty one is named first, and none passes."""
     rng, first, tried = np.random.default_rng(seeds[0]), 0, 0
@@ -95,12 +90,6 @@ def test_a_small_load_that_is_missing_does_not_pass() -> None:
     assert passed > 5  # whose statuses alone say that all is well
 
 
-def test_zero_loads_are_right_where_nothing_touches() -> None:
-    verdict = cr.verify(paper(), np.zeros(61), approach=-1e-5)
-    assert verdict.holds
-    assert verdict.error == 0.0
-
-
 def test_wrong_loads_do_not_pass_as_true() -> None:
     contact = cr.press(paper(), approach=PAPER_APPROACH)
     half = 0.5 * contact.loads
@@ -110,13 +99,13 @@ def test_wrong_loads_do_not_pass_as_true() -> None:
         bool(cr.certify(paper(), half, approach=PAPER_APPROACH))
     problem = NormalProblem.assemble(paper(), approach=PAPER_APPROACH)
     halved = cr.solvers.Solution.of(problem, half[problem.candidates], PAPER_APPROACH, 0)
-    halves = SimpleNamespace(
-        name="half",
-        solve=lambda problem, start: replace(halved, loads=halved.loads / problem.units.force),
-    )
-    (said,) = set(cr.press(paper(), approach=PAPER_APPROACH, solver=halves).warnings) - set(
-        contact.warnings
-    )
+
+    def solve(problem: Any, start: Any) -> Any:
+        return replace(halved, loads=halved.loads / problem.units.force)
+
+    halves: Any = SimpleNamespace(name="half", solve=solve)
+    wrong = cr.press(paper(), approach=PAPER_APPROACH, solver=halves)
+    (said,) = {*wrong.warnings} - {*contact.warnings}
     assert said.startswith("the loads err by up to")
 
 
@@ -135,14 +124,11 @@ def test_totals_in_another_unit() -> None:
 @pytest.mark.parametrize("wrong", ["turned", "too high"])
 def test_loads_that_are_far_off_do_not_hold_by_default(wrong: str) -> None:
     """Their set is right, and proved from these loads alone."""
-    asperities = cr.Asperities.hexagonal(
-        spacing=0.0025, tip_radius=0.02, within=0.0051, height_std=1e-6, seed=3
-    )
-    scene = cr.Scene(1.0, asperities, MATERIAL)
+    scene = hexagonal(within=0.0051, height_std=1e-6, seed=3)
     contact = cr.press(scene, load=4e-7)
     loads, control = 1.2 * contact.loads, {"approach": contact.approach}
     if wrong == "turned":
-        x, y = asperities.positions.T
+        x, y = scene.asperities.positions.T
         c, s = np.cos(np.pi / 3), np.sin(np.pi / 3)
         apart = np.hypot((c * x - s * y)[:, None] - x, (s * x + c * y)[:, None] - y)
         loads, control = contact.loads[apart.argmin(axis=1)], {"load": 4e-7}

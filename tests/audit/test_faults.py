@@ -12,12 +12,8 @@ from scene_files import scene_text
 
 from convexrough.atomic import remove_unfinished
 
-TESTS = Path(__file__).parent.parent
-
+TESTS, BATCH = Path(__file__).parent.parent, 18
 forks = pytest.mark.skipif(not hasattr(os, "fork"), reason="trials are forked processes")
-
-
-BATCH = 18
 
 
 def printed(program: str, *numbers: int) -> list[str]:

@@ -1,19 +1,19 @@
 """One thread and two add up in another order: the answers agree within their bounds."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from scenes import hexagonal
 from threadpoolctl import threadpool_limits
 
 import convexrough as cr
 
 
 def answer(influence: Any, threads: int) -> tuple[cr.Contact, cr.ShearState]:
-    a = cr.Asperities.hexagonal(
-        spacing=0.0013, tip_radius=0.0104, within=0.0102, height_std=1e-6, seed=3
-    )
-    scene = cr.Scene(1.0, a, cr.Material(1.0, 0.3), 0.5)
+    rough = hexagonal(spacing=0.0013, tip_radius=0.0104, height_std=1e-6, seed=3)
+    scene = replace(rough, friction=0.5, geometry="closest")
     with threadpool_limits(threads):
         contact = cr.press(scene, approach=5e-5, influence=influence)
         return contact, cr.shear(contact, force=0.25 * contact.load)

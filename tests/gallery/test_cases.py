@@ -16,33 +16,22 @@ import convexrough as cr
 from convexrough import gallery, solvers
 
 NAMES = gallery.names()
-
-#: Of the last of 50 digits.
-UNIT = Fraction(1, 10**49)
+UNIT = Fraction(1, 10**49)  # of the last of 50 digits
 
 #: 64 bristles are off by about 1 / 64^2, which a Newton step squares; the others are nearer.
 SQUARED = 64.0**-4
 
 #: Newton's method is in every other test, and CVXPY sends Clarabel what Conic does.
-SOLVERS = [
-    solvers.Conic(),
-    solvers.ConicCVXPY(solver="QOCO"),
-    solvers.ConicCVXPY(solver="SCS"),
-    solvers.BristleQP(),
-]
+CVXPY = [solvers.ConicCVXPY(solver=name) for name in ("QOCO", "SCS")]
+SOLVERS = [solvers.Conic(), *CVXPY, solvers.BristleQP()]
 
 each_case = pytest.mark.parametrize("name", NAMES)
 
-#: Scales, vectors and proofs are asked of the first case of each family: what differs inside a
-#: family is how near a thing is to happening.
+#: The first case of each family; what differs inside a family is how near a thing is to happening.
 FIRST = [*{gallery.case(name).family: name for name in reversed(NAMES)}.values()]
-each_family = pytest.mark.parametrize("name", FIRST)
 
 #: A case and an operator that it allows.
-each_operator = pytest.mark.parametrize(
-    ("name", "operator"),
-    [(name, kind) for name in NAMES for kind in operators(gallery.case(name).scene)],
-)
+PAIRS = [(name, kind) for name in NAMES for kind in operators(gallery.case(name).scene)]
 
 
 @cache
@@ -54,10 +43,9 @@ def pressed(name: str, operator: Any = "dense") -> cr.Contact:
 def within(values: Any, digits: Any, bounds: Any) -> bool:
     """In exact arithmetic, but for the last digit; an infinite bound holds."""
     exact = map(Fraction, digits)
-    triples = zip(np.atleast_1d(values), exact, np.atleast_1d(bounds), strict=True)
-    return all(
-        b == np.inf or abs(Fraction(v) - x) <= Fraction(b) + abs(x) * UNIT for v, x, b in triples
-    )
+    all_three = zip(np.atleast_1d(values), exact, np.atleast_1d(bounds), strict=True)
+    bounded = [(v, x, b) for v, x, b in all_three if b != np.inf]
+    return all(abs(Fraction(v) - x) <= Fraction(b) + abs(x) * UNIT for v, x, b in bounded)
 
 
 def true_shear_statuses(case: cr.gallery.HardCase, statuses: Any) -> bool:
@@ -74,7 +62,7 @@ def test_the_stored_answer_is_computed_anew(name: str) -> None:
 
 
 @pytest.mark.sample(10)
-@each_operator
+@pytest.mark.parametrize(("name", "operator"), PAIRS)
 def test_statuses_and_bounds_when_pressed(name: str, operator: Any) -> None:
     case, contact = gallery.case(name), pressed(name, operator)
     proof = contact.certificate
@@ -140,7 +128,7 @@ def test_a_hundred_thousand_reversals(name: str, pytestconfig: pytest.Config) ->
 
 
 @pytest.mark.sample(3)
-@each_family
+@pytest.mark.parametrize("name", FIRST)
 @pytest.mark.parametrize(("length", "modulus"), [(2.0**5, 2.0**-4), (2.0**-11, 2.0**10)])
 def test_powers_of_two_scale_every_bit(name: str, length: float, modulus: float) -> None:
     """Where the exponents differ by a multiple of 3: k is a cube root, which must scale, too."""

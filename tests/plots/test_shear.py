@@ -1,4 +1,4 @@
-"""Figures of shear, cycles, histories and the paper say what the states say; nothing collides."""
+"""Figures of shear, cycles, paths and the paper say what the states say; nothing collides."""
 
 import dataclasses
 from functools import cache
@@ -9,21 +9,17 @@ import pytest
 from figure_checks import discs, fits, texts
 from matplotlib.colors import to_rgba
 from numpy.testing import assert_allclose
-from scenes import MATERIAL, PAPER_APPROACH, paper, rough
+from path_scenes import LARGEST, ONE, PAPER, follow
+from scenes import PAPER_APPROACH, on_sphere, paper, rough
 
 import convexrough as cr
 from convexrough import plots
 from convexrough.paper.example import PaperStates
 from convexrough.paper.figures import paper_figures
-from convexrough.plots.asperity_map import SLIDING
+from convexrough.plots.asperity_map import LOOKS, SLIDING
 from convexrough.sphere.smooth import smooth
 
-SCENES = {
-    "paper": paper(),
-    "rough": rough(),
-    "one": cr.Scene(1.0, cr.Asperities([[0.0, 0.0]], 0.02), MATERIAL, geometry="summit"),
-    "nothing": paper(),
-}
+SCENES = {"paper": paper(), "rough": rough(), "one": on_sphere([[0.0, 0.0]]), "nothing": paper()}
 
 
 @cache
@@ -121,3 +117,33 @@ def test_no_contact_is_said() -> None:
     for figure in figures.values():
         assert "no contact" in {text.get_text() for text in texts(figure)}
         fits(figure)
+
+
+def test_the_path_and_its_memory_are_drawn() -> None:
+    path, P = follow("paper", ONE), LARGEST["paper"]
+    figures = plots.path_figures(path)
+    fits(*figures.values())
+    plane, loop, cost = figures["path"].axes
+    lines = {line.get_label(): line.get_xydata() for line in plane.lines}
+    last = path.curves[-1]
+    vertices = np.array([[float(each) for each in row] for row in (last.levels, last.heights)])
+    assert_allclose(lines["memory at 7"], vertices.T / P)
+    assert loop.lines[-1].get_ydata()[-1] == pytest.approx(path.forces[-1] / (0.5 * P))
+    W0 = cr.smooth(PAPER, load=P).energy_scale
+    assert cost.lines[0].get_ydata()[-1] == pytest.approx(path.losses[-1] / W0)
+    place = figures["path_stick_slip"].axes[3]
+    assert discs(place, "sliding") == int((path.status[3] == "sliding").sum())
+
+
+def test_what_a_closed_path_settles_to() -> None:
+    P, named = LARGEST["paper"], dataclasses.replace(PAPER, units=("µm", "mN"))
+    found = cr.steady(named, loads=[0.9 * P, 0.5 * P], forces=[0.2 * P, -0.2 * P])
+    figure = plots.steady_figures(found)["steady"]
+    fits(figure)
+    plane, place = figure.axes
+    pico = 1e-9  # of mN
+    dot = plane.lines[-1].get_xydata()
+    expected = [[found.level / pico, found.force_level / (0.5 * pico)]]
+    assert_allclose(dot, expected, rtol=1e-12, atol=1e-9)
+    for status in LOOKS:
+        assert discs(place, status) == int((found.status == status).sum())

@@ -18,9 +18,6 @@ from convexrough.run.stages.normal import NormalStage
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 BROWSER = next((found for name in NAMES if (found := shutil.which(name))), None)
-in_browser = pytest.mark.skipif(
-    BROWSER is None, reason=f"no browser to open the page in: none of {', '.join(NAMES)}"
-)
 
 
 @pytest.fixture(scope="module")
@@ -153,7 +150,7 @@ def assert_shown(shown: Opened, contact: cr.Contact, fraction: float, index: int
     assert at == f"M{moved[0]:g} {share[0]:g}h0"
 
 
-@in_browser
+@pytest.mark.skipif(BROWSER is None, reason=f"no browser to open the page in: none of {NAMES}")
 def test_the_keyboard_moves_the_force(opened: Opened, contact: cr.Contact) -> None:
     opened.page.keyboard.press("Tab")
     assert opened.page.evaluate("document.activeElement.id") == "force"

@@ -17,14 +17,8 @@ from convexrough.programs import program
 #: The source paper's, its inner 19 asperities.
 SCENE = hexagonal(within=0.0051)
 CONTACT = cr.press(SCENE, approach=PAPER_APPROACH)
-CONTROLS: dict[str, dict[str, float]] = {
-    "approach": {"approach": PAPER_APPROACH},
-    "load": {"load": CONTACT.load},
-}
-each_control = pytest.mark.parametrize("control", CONTROLS)
-
-#: 8 bristles: the method of HiGHS is one of active sets, and takes its time with more.
-FEW = 8
+CONTROLS = {"approach": PAPER_APPROACH, "load": CONTACT.load}
+FEW = 8  # bristles: the method of HiGHS is one of active sets, and takes its time with more
 
 
 def energy(control: str) -> float:
@@ -59,26 +53,24 @@ def by_highs(path: Path) -> tuple[Any, Any, float]:
     return solution.col_value, solution.row_dual, highs.getObjectiveValue()
 
 
-@each_control
+@pytest.mark.parametrize("control", CONTROLS)
 @pytest.mark.parametrize(
     ("form", "ending"), [("cones", "npz"), ("dual", "npz"), ("bristles", "mps")]
 )
 def test_files_are_solved_by_others(form: Any, ending: str, control: str, tmp_path: Path) -> None:
     """Other forms and endings are those of the gallery, which its tests read."""
-    made = program(SCENE, form, **CONTROLS[control], bristles=FEW)
+    made = program(SCENE, form, **{control: CONTROLS[control]}, bristles=FEW)
     made.save(tmp_path / f"scene.{ending}")
     read = by_highs if ending == "mps" else by_scs
     x, z, objective = read(tmp_path / f"scene.{ending}")
     loads = made.loads(z if form == "dual" else x)
-    near = 1e-4 + made.load_error_estimate
+    near, exact = 1e-4 + made.load_error_estimate, energy(control)
     assert np.abs(loads - CONTACT.loads).max() < near * CONTACT.loads.max()
     if form == "bristles":  # another energy than that of the contact: its own
         assert objective == pytest.approx(made.objective, rel=1e-6)
     else:
-        assert made.energy(made.objective) == pytest.approx(energy(control), rel=1e-12)
-    assert made.energy(objective) == pytest.approx(
-        energy(control), rel=1e-6 + made.load_error_estimate
-    )
+        assert made.energy(made.objective) == pytest.approx(exact, rel=1e-12)
+    assert made.energy(objective) == pytest.approx(exact, rel=1e-6 + made.load_error_estimate)
 
 
 def test_a_program_that_is_not_convex_is_not_made() -> None:
@@ -93,11 +85,8 @@ def test_the_command(command: Any, tmp_path: Path) -> None:
     assert (ran.status, ran.err) == (0, "")
     folder = tmp_path / "scene-programs"
     index = json.loads((folder / "index.json").read_text())
-    assert {path.name for path in folder.iterdir()} == {
-        *index["programs"],
-        "index.json",
-        "files.json",
-    }
+    written = {path.name for path in folder.iterdir()}
+    assert written == {*index["programs"], "index.json", "files.json"}
     assert len(index["programs"]) == 8
     assert command("export", "scene.toml").refuses("not empty")
     one = command("export", "scene.toml", "--format", "mps", "--out", "one", "--json")

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scene_files import FRICTION, HEXAGONAL, TWO_BODIES, WITHIN, scene_text
+from scene_files import FRICTION, HEXAGONAL, STAGES, TWO_BODIES, WITHIN, scene_text
 
 import convexrough as cr
 
@@ -24,8 +24,7 @@ def test_the_default_within_loses_no_asperity(
     generous = read(text + "within = 0.05", normal)
     n = len(file.scene)
     assert n < len(generous.scene) / 4
-    same = cr.press(file.scene, approach=file.approach, load=file.load)
-    far = cr.press(generous.scene, approach=file.approach, load=file.load)
+    same, far = file.press(), generous.press()
     assert same.certificate.all_proved
     assert far.certificate.all_proved
     assert np.allclose(far.loads[:n], same.loads, rtol=1e-12, atol=0)
@@ -40,23 +39,14 @@ def test_bases_and_bodies(read: Any) -> None:
     assert read(WITHIN, material=TWO_BODIES).scene.material == cr.Material.pair(steel, soft)
 
 
-STAGES = """[shear]
-fractions = [0.3]
-[cycle]
-maximum_fraction = [0.1, 0.4]
-[history]
-fractions = [0.5, -0.2]
-[gradient]
-of = "loss"
-fraction = 0.2
-"""
+MORE = f'{FRICTION}{STAGES}[gradient]\nof = "loss"\nfraction = 0.2\n'
 
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("radius", ["inf", "[1.0, 2.5]", "[1.0, inf]"])
 def test_a_whole_run(run: Any, command: Any, radius: str) -> None:
     """With a proof that the checker accepts."""
-    text = scene_text(WITHIN, "load = 0.02", FRICTION + STAGES, radius, TWO_BODIES)
+    text = scene_text(WITHIN, "load = 0.02", MORE, radius, TWO_BODIES)
     outcome = run(text, "--proof")
     assert outcome.status == 0, outcome.err
     assert "Dundurs' beta = -0.117, neglected" in outcome.out
@@ -72,5 +62,5 @@ def test_a_whole_run(run: Any, command: Any, radius: str) -> None:
 
 
 def test_the_slider_page_is_of_spheres(run: Any) -> None:
-    text = scene_text(WITHIN, "load = 1e-7", FRICTION + STAGES, radius="inf")
+    text = scene_text(WITHIN, "load = 1e-7", MORE, radius="inf")
     assert run(text, "--html").refuses("slider page: found a flat, expected a sphere")

@@ -8,41 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 from path_scenes import shaded
-from scene_files import EVERYTHING, FRICTION, HEXAGONAL, WITHIN, put, rows, scene_text
+from scene_files import EVERYTHING, FRICTION, HEXAGONAL, LOAD, WITHIN, put, rows, scene_text
 
 import convexrough as cr
 from convexrough.friction import general_step
 from convexrough.progress import logged
 
-SCENE = scene_text(WITHIN, more=EVERYTHING)
-
-
 #: Stages that rest on an order that is proved.
 RESTING = ("cycle", "history", "path", "steady", "shakedown")
-SHADED = scene_text(
-    'pattern = "file"\npath = "shaded.csv"\ngeometry = "summit"', "approach = 1.4", FRICTION, "1e6"
-)
-STAGES = """
-[shear]
-fractions = [0.3]
-[cycle]
-maximum_fraction = [0.3]
-loop_points = 8
-[history]
-fractions = [0.3, -0.1]
-[path]
-loads = [0.8, 1.0]
-forces = [0.0, 0.1]
-reference = LOAD
-[steady]
-loads = [0.8, 1.0]
-forces = [-0.1, 0.1]
-reference = LOAD
-[shakedown]
-load = 1.0
-force_amplitudes = [0.1, -0.1]
-reference = LOAD
-"""
+SHADED = 'pattern = "file"\npath = "shaded.csv"\ngeometry = "summit"', "approach = 1.4"
 
 
 def test_nothing_is_proved_where_order_fails(run: Any, command: Any, monkeypatch: Any) -> None:
@@ -53,18 +27,17 @@ def test_nothing_is_proved_where_order_fails(run: Any, command: Any, monkeypatch
     x, y = low.positions.T
     columns = {"x": x, "y": y, "height": low.heights, "tip_radius": low.tip_radii}
     put(Path(), columns, "shaded.csv")
-    load = json.loads(run(SHADED, "--json").out)["normal"]["load"]
-    outcome = run(SHADED + STAGES.replace("LOAD", repr(load)), "--out", "out")
+    load = json.loads(run(scene_text(*SHADED, FRICTION, "1e6"), "--json").out)["normal"]["load"]
+    stages = EVERYTHING.replace(repr(LOAD), repr(load)).replace("[0.1, 0.37, 0.5]", "[0.3]")
+    outcome = run(scene_text(*SHADED, stages, "1e6"), "--out", "out")
     assert outcome.status == 3
     assert repr(str(Path().absolute())) in Path("out/scene.toml").read_text().splitlines()[0]
     summary = json.loads(Path("out/summary.json").read_text())
     for stage in ("path", "steady", "shakedown"):
         assert summary[stage]["order"] == "fails"
     for stage in ("shear", "cycle", "history", "path", "steady", "shakedown"):
-        assert (
-            "not proved: that indentations increase with the load, "
-            f"which the proof of [{stage}] needs" in outcome.err
-        )
+        said = "not proved: that indentations increase with the load, which the proof of "
+        assert f"{said}[{stage}] needs" in outcome.err
     assert summary["steady"]["loss_error"] is None
     assert summary["steady"]["undecided"] > 0
     assert summary["shakedown"]["proved"] is False
@@ -78,10 +51,9 @@ def test_nothing_is_proved_where_order_fails(run: Any, command: Any, monkeypatch
     assert "force error       no bound is proved (1 % allowed)" in said.out
 
 
-def test_what_is_only_checked_is_not_certified(tmp_path: Path) -> None:
+def test_what_is_only_checked_is_not_certified(read: Any) -> None:
     """Each stage rests on its order, and shakedown on its bounds, too."""
-    (tmp_path / "scene.toml").write_text(SCENE)
-    file = cr.read_scene(tmp_path / "scene.toml")
+    file = read(WITHIN, more=EVERYTHING)
     contact, said = file.press(), list[str]()
     with logged(lambda record: said.append(record.getMessage())):
         results = file.compute(contact)
@@ -103,16 +75,12 @@ def test_what_is_only_checked_is_not_certified(tmp_path: Path) -> None:
                 assert said.startswith(f"not proved: the losses of [{result.name}],")
 
 
-def test_an_array_for_the_largest_load_of_a_path(tmp_path: Path) -> None:
+def test_an_array_for_the_largest_load_of_a_path(read: Any) -> None:
     """The pattern is wide enough for loads above that of [normal]; too narrow ones are told."""
     path = FRICTION + "[path]\nloads = [1.2e-6, 1.2e-6]\nforces = [0.0, 1e-7]\n"
 
-    def run(
-        within: str, normal: str = "load = 3e-8", radius: str = "1.0"
-    ) -> tuple[cr.Contact, Any, list[str]]:
-        file = tmp_path / "scene.toml"
-        file.write_text(scene_text(HEXAGONAL + within, normal, path, radius))
-        scene = cr.read_scene(file)
+    def run(within: str, load: str = "3e-8", radius: str = "1.0") -> tuple[cr.Contact, Any, Any]:
+        scene = read(HEXAGONAL + within, f"load = {load}", path, radius)
         contact = scene.press()
         return contact, scene.compute(contact)[1].found[0], list(scene.cautions(contact))
 
@@ -124,7 +92,7 @@ def test_an_array_for_the_largest_load_of_a_path(tmp_path: Path) -> None:
     assert [each for each in narrow if "under the loads of [path] contact reaches the rim" in each]
     long = "within = 0.0102\nheight_std = 2e-6\nseed = 3"
     for load, ended in (("1e-9", True), ("1e-7", False)):  # at 1e-7 [normal] has warned of it
-        *_, said = run(long, f"load = {load}", "[inf, 1.0]")
+        *_, said = run(long, load, "[inf, 1.0]")
         assert any(each.startswith("under the loads of [path]") for each in said) == ended
 
 
@@ -141,8 +109,7 @@ STEADY += "ellipse = {load = 1.0, force_amplitude = 0.1, chords = 6}\n"
 
 def test_a_steady_state_of_which_nothing_is_proved(run: Any) -> None:
     """Nothing times an infinite error is nothing: a warning of numpy's, and no number, was it."""
-    layout = 'pattern = "hexagonal"\nspacing = 0.0025\ntip_radius = 0.02\nwithin = 0.006'
-    outcome = run(scene_text(layout, more=STEADY))
+    outcome = run(scene_text(f"{HEXAGONAL}within = 0.006", more=STEADY))
     assert outcome.status == 3
     assert "nan" not in outcome.out
 

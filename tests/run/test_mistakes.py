@@ -4,10 +4,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from scene_files import FRICTION, TWO_BODIES, WITHIN, scene_text
+from scene_files import FRICTION, TWO_BODIES, WITHIN, put, refusal, scene_text
 
 import convexrough as cr
-from convexrough.run.scene_file import read_scene
 
 
 def layout(keys: str, normal: str = "approach = 5e-5", more: str = "") -> str:
@@ -130,13 +129,7 @@ def test_bad_scenes(command: Any, tmp_path: Path, scene: str | bytes, message: s
 
 
 def refused(folder: Path, text: str) -> list[str]:
-    path = folder / "scene.toml"
-    path.write_text(text, encoding="utf-8")
-    with pytest.raises(cr.ConvexroughError) as caught:
-        read_scene(path)
-    lines = str(caught.value).split("\n")
-    assert all(line.startswith(f"{path}: ") for line in lines)
-    return [line.removeprefix(f"{path}: ") for line in lines]
+    return refusal(cr.read_scene, folder / put(folder, text, "scene.toml"))
 
 
 def test_all_mistakes_are_told_at_once(tmp_path: Path) -> None:

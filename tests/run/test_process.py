@@ -57,7 +57,7 @@ def test_an_interrupt_while_an_object_is_freed(tmp_path: Path) -> None:
         "class Freed:\n"
         "    def __del__(self): signal.raise_signal(signal.SIGINT)\n"
         "def status(arguments):\n"
-        "    import time; Freed(); time.sleep(10)\n"
+        "    import time; Freed(); [time.sleep(0.01) for _ in range(1000)]\n"
         "program._status = status\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler); sys.exit(program.main([]))"
     )

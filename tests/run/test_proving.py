@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scene_files import FRICTION, HEXAGONAL, lines, scene_text
+from scene_files import FRICTION, HEXAGONAL, lines, put, scene_text
 
 import convexrough as cr
 
@@ -71,13 +71,9 @@ def test_verify_proves_loads_and_overwrites_nothing(command: Any, tmp_path: Path
 
 def test_a_state_without_a_proof_does_not_cost_the_others(run: Any, tmp_path: Path) -> None:
     """A small asperity is shaded by two large ones near it, so that order fails farther down."""
-    columns = {
-        "x": [0.00104, 0.00122, 0.00108],
-        "y": [0.00137, -0.00115, 0.00116],
-        "height": [-4.6e-9, 7e-10, -3.4e-9],
-        "tip_radius": [0.00109, 0.0186, 0.0149],
-    }
-    (tmp_path / "a.csv").write_text(lines(columns))
+    places = {"x": [0.00104, 0.00122, 0.00108], "y": [0.00137, -0.00115, 0.00116]}
+    tips = {"height": [-4.6e-9, 7e-10, -3.4e-9], "tip_radius": [0.00109, 0.0186, 0.0149]}
+    put(tmp_path, places | tips, "a.csv")
     shear = FRICTION + "[shear]\nfractions = [0.05, 0.6]\n"
     file = 'pattern = "file"\npath = "a.csv"\ngeometry = "summit"\n'
     ran = run(scene_text(file, "approach = 2.2e-5", shear, radius="2.0"), "--proof")

@@ -1,5 +1,9 @@
-"""Results on disk: complete files and folders, earlier runs, where results are from; warnings."""
+"""Results on disk: complete files and folders, earlier runs, where results are from; warnings.
 
+And how outside programs read them: names of files, columns, and keys.
+"""
+
+import csv
 import hashlib
 import json
 from pathlib import Path
@@ -8,12 +12,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scene_files import FRICTION, HEXAGONAL, scene_text
+from scene_files import EVERYTHING, FRICTION, HEXAGONAL, WITHIN, scene_text
+from scenes import MATERIAL, hexagonal
 
 import convexrough as cr
+from convexrough import plots
 from convexrough.atomic import replacing
-from convexrough.run.results import MANIFEST, results_folder
+from convexrough.run.results import MANIFEST, Writer, results_folder
 from convexrough.solvers import Solution
+
+GOLDEN = Path(__file__).parents[1] / "golden" / "folder.json"
 
 
 def test_a_file_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
@@ -112,6 +120,44 @@ def test_a_folder_says_where_its_results_are_from(run: Any) -> None:
     assert said["versions"]["numpy"] == np.__version__
 
 
+def keys(value: Any) -> Any:
+    """The keys of objects; of a list those of its first element; of a number or a word nothing."""
+    if isinstance(value, dict):
+        return {key: keys(each) for key, each in value.items()}
+    return [keys(value[0])] if isinstance(value, list) and value else None
+
+
+def test_names_columns_and_keys(command: Any, tmp_path: Path, monkeypatch: Any) -> None:
+    """All is solved before the first file is written."""
+    (tmp_path / "a.toml").write_text(scene_text(WITHIN, more=EVERYTHING))
+    monkeypatch.setattr(plots, "save", lambda figure, path, *_: path.touch())
+    with monkeypatch.context() as patch:
+        first = Writer.summary
+
+        def after(*given: Any) -> None:
+            for solves in ("normal.problem.NormalProblem.assemble", "normal.levels.Levels.at",
+                           "friction.levels.FrictionLevels.rows"):  # fmt: skip
+                patch.setattr(f"convexrough.{solves}", None)  # not to be called
+            first(*given)
+
+        patch.setattr(Writer, "summary", after)
+        ran = command("run", "a.toml", "--out", "out", "--html")
+    assert (ran.status, ran.err) == (0, "")
+    files = {path.name: path for path in Path("out").iterdir()}
+    found: dict[str, Any] = {"files": sorted(files)}
+    for path in Path("out").glob("*.csv"):
+        found[path.name] = next(csv.reader(path.read_text().splitlines()))
+    for name in ("summary.json", "files.json"):
+        found[name] = keys(json.loads(files[name].read_text()))
+    loads = "out/asperities.csv"
+    claim = ("--shear", "forces.csv", "--shear-force", "0", "--out", "verdict", "--json")
+    (tmp_path / "forces.csv").write_text("force\n" + "0\n" * 61)
+    found["verify"] = keys(json.loads(command("verify", "a.toml", loads, *claim).out))
+    found["compare"] = keys(json.loads(command("compare", "a.toml", "--json").out))
+    (tmp_path / "found.json").write_text(json.dumps(found, indent=1))
+    assert found == json.loads(GOLDEN.read_text())
+
+
 # Plausibility: a warning with its numbers, never an error.
 
 
@@ -129,10 +175,8 @@ def test_contact_beyond_the_sphere(run: Any, command: Any) -> None:
 
 def test_an_array_that_ends_inside_the_contact_is_told() -> None:
     """By contact at the rim, as with a radius in the wrong unit, or where all asperities touch."""
-    wide, few, seven, one = (
-        cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=within)
-        for within in (0.0102, 0.0045, 0.004, 0.002)
-    )
+    within = (0.0102, 0.0045, 0.004, 0.002)
+    wide, few, seven, one = (hexagonal(within=each).asperities for each in within)
     rim = "contact reaches the rim of the array, which is at 0."
     sites = 1e-3 * np.stack(np.meshgrid(*2 * [np.arange(-7, 8)]), axis=-1).reshape(-1, 2)
     square, corner = cr.Asperities(sites, 0.02), cr.Asperities(wide.positions + 0.0102, 0.02)
@@ -157,6 +201,6 @@ def test_an_array_that_ends_inside_the_contact_is_told() -> None:
         (corner, (1.0, np.inf), {"load": 3.6e-7}, "axis of the sphere, at x = 0 and y = 0"),
         (corner, np.inf, {"load": 3.6e-7}, ""),
     ):
-        contact = cr.press(cr.Scene(base, array, cr.Material(1.0, 0.3)), **control)
+        contact = cr.press(cr.Scene(base, array, MATERIAL), **control)
         assert bool(contact.warnings) == bool(told)
         assert told in " ".join(contact.warnings)

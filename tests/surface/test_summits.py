@@ -1,11 +1,23 @@
-"""Summits as asperities, and the generator whose spectrum is known."""
+"""Summits: hills and their prominences, fitted tips, asperities, and Gaussian statistics."""
+
+from typing import Any
 
 import numpy as np
+import pytest
 from numpy.testing import assert_allclose
+from numpy.typing import NDArray
+from scipy import ndimage
+from scipy.integrate import quad
 
 import convexrough as cr
+from convexrough.sphere.ellipse import load_ratio
+from convexrough.surface.pixels import hills
+from convexrough.surface.summits import fit_tips
 
 MAP = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1, pixels=256)
+PIXEL = (0.5, 0.3)
+Map = NDArray[np.float64]
+Place = tuple[int, int]
 
 
 def test_summits_are_asperities_that_know_their_map() -> None:
@@ -46,12 +58,10 @@ def test_the_map_has_the_moments_of_its_spectrum() -> None:
 
 def test_summits_are_as_a_gaussian_surface_has_them() -> None:
     """Density, curvature and heights of all maxima against Nayak's theory."""
-    options = dict(hurst=0.8, rms_slope=0.1, rolloff=64.0, pixels=512, cutoff=16.0)
-    exact = cr.surface.self_affine_moments(**options)  # type: ignore[arg-type]
-    found = [
-        cr.surface.self_affine(seed=seed, **options).summits(0.0).statistics  # type: ignore[arg-type]
-        for seed in range(12)
-    ]
+    options: Any = dict(hurst=0.8, rms_slope=0.1, rolloff=64.0, pixels=512, cutoff=16.0)
+    exact = cr.surface.self_affine_moments(**options)
+    maps = [cr.surface.self_affine(seed=seed, **options) for seed in range(12)]
+    found = [each.summits(0.0).statistics for each in maps]
     density, curvature, height, spread = np.mean(found, axis=0)
     assert_allclose(density, exact.density, rtol=0.02)
     assert_allclose(curvature, exact.mean_curvature, rtol=0.04)
@@ -68,3 +78,97 @@ def test_round_tops_are_round_in_spite_of_rounding() -> None:
     assert len(summits) == 100
     assert (summits.eccentricities < 1e-6).all()
     assert (summits.elliptic_loads >= 1).all()
+
+
+def around(heights: Map, place: Place) -> list[Place]:
+    """The pixel and its up to eight neighbours."""
+    rows, columns = (range(max(i - 1, 0), i + 2) for i in place)
+    return [(i, j) for i in rows for j in columns if i < heights.shape[0] and j < heights.shape[1]]
+
+
+def wolf(heights: Map) -> dict[Place, float]:
+    """Wolf pruning as the standard says it: the least high hill goes, and once more."""
+    summit = {}  # of the hill of each pixel: the way up from it ends there
+    for start in np.ndindex(heights.shape):
+        place, above = start, max(around(heights, start), key=heights.item)
+        while above != place:
+            place, above = above, max(around(heights, above), key=heights.item)
+        summit[start] = place
+    left, gone = set(summit.values()), {}
+    while len(left) > 1:
+        saddles: dict[Place, tuple[float, Place]] = {}
+        for one in np.ndindex(heights.shape):
+            for other in around(heights, one):
+                if summit[one] != summit[other]:
+                    saddle = min(heights[one], heights[other]), summit[other]
+                    saddles[summit[one]] = max(saddles.get(summit[one], saddle), saddle)
+        least = min(left, key=lambda peak: heights[peak] - saddles[peak][0])
+        level, taken_by = saddles[least]
+        gone[least] = float(heights[least] - level)
+        left.remove(least)
+        summit = {place: taken_by if it == least else it for place, it in summit.items()}
+    assert list(gone.values()) == sorted(gone.values())  # so a threshold keeps the rest of them
+    (last,) = left
+    return gone | {last: float(heights[last] - heights.min())}
+
+
+@pytest.mark.sample(6)
+@pytest.mark.parametrize("seed", range(16))
+def test_pruning_is_wolf_pruning(seed: int) -> None:
+    noise = np.random.default_rng(seed).standard_normal((14, 17))
+    heights = np.asarray(ndimage.gaussian_filter(noise, 0.3 * (seed % 4)))
+    found = hills(heights)
+    peaks = [(int(i), int(j)) for i, j in found.pixels]
+    assert dict(zip(peaks, found.prominences.tolist(), strict=True)) == wolf(heights)
+    assert [heights[peak] for peak in peaks] == sorted(heights[tuple(found.pixels.T)])[::-1]
+
+
+def test_a_plateau_is_one_hill() -> None:
+    heights = np.zeros((9, 9))
+    heights[2:4, 2:7] = heights[2:7, 5:7] = 1.0  # an L
+    heights[6, 1] = 0.5
+    found = hills(heights)
+    assert found.prominences.tolist() == [1.0, 0.5]
+    assert heights[tuple(found.pixels[0])] == 1.0
+    assert found.pixels[1].tolist() == [6, 1]
+
+
+@pytest.mark.parametrize("across", [3, 5, 7])
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e6])
+def test_a_paraboloid_is_found_exactly(across: int, scale: float) -> None:
+    """Whatever the unit: top, height and both principal curvatures, of a turned paraboloid."""
+    dx, dy = PIXEL[0] * scale, PIXEL[1] * scale
+    x, y = np.meshgrid(np.arange(-5, 6) * dx, np.arange(-4, 5) * dy)
+    x0, y0, angle, k1, k2 = 0.3 * dx, -0.4 * dy, 0.7, 3.0 / scale, 0.4 / scale
+    u = np.cos(angle) * (x - x0) + np.sin(angle) * (y - y0)
+    v = np.cos(angle) * (y - y0) - np.sin(angle) * (x - x0)
+    heights = 2.0 * scale - k1 * u**2 / 2 - k2 * v**2 / 2
+    tips = fit_tips(heights, np.array([[4, 5]]), (dx, dy), across)
+    assert tips.whole.all()
+    assert_allclose(tips.offsets[0], [x0, y0], rtol=1e-11)
+    assert_allclose(tips.heights, 2.0 * scale, rtol=1e-13)
+    assert_allclose(tips.curvatures[0], [k1, k2], rtol=1e-10)
+    reach = across // 2
+    near = np.s_[4 - reach : 5 + reach, 5 - reach : 6 + reach]
+    sphere = 2.0 * scale - np.sqrt(k1 * k2) * ((x - x0) ** 2 + (y - y0) ** 2) / 2
+    deviation = np.sqrt(np.mean((heights - sphere)[near] ** 2))
+    assert_allclose(tips.deviations, deviation, rtol=1e-10)
+
+
+@pytest.mark.parametrize("axes", [0.9, 0.5, 0.1, 0.01])
+def test_the_elliptic_contact_by_quadrature(axes: float) -> None:
+    """Displacements under p0 sqrt(1 - x^2/a^2 - y^2/b^2), from the integrals of the potential."""
+    b = axes
+
+    def integral(power_a: float, power_b: float) -> float:
+        def at(t: float) -> float:  # s = t^2
+            return 2 * (1 + t * t) ** -(0.5 + power_a) * (b * b + t * t) ** -(0.5 + power_b)
+
+        return sum(quad(at, *ends, epsrel=1e-11)[0] for ends in ((0, b), (b, 1), (1, np.inf)))
+
+    scale = b / 2  # p0 = E* = 1
+    indentation, k2, k1 = (scale * integral(*p) for p in ((0, 0), (1, 0), (0, 1)))
+    k1, k2 = 2 * k1, 2 * k2
+    load = 2 / 3 * np.pi * b
+    sphere = 4 / 3 * np.sqrt(1 / np.sqrt(k1 * k2)) * indentation**1.5
+    assert_allclose(load_ratio(k1 / k2), load / sphere, rtol=1e-8)

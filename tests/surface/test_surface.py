@@ -77,17 +77,11 @@ def test_a_paraboloid_of_a_turned_cylinder() -> None:
 
 def test_a_trend_that_explains_most_is_named() -> None:
     ball, tilt = -(X**2 + Y**2) / 400, 0.3 * X
-    for trend, kind in (
-        (tilt, "plane"),
-        (ball, "sphere"),
-        (ball + tilt / 10, "sphere"),
-        (-(X**2) / 300 + tilt, "paraboloid"),
-        (-ball, "sphere"),
-    ):
+    spheres = [(each, "sphere") for each in (ball, ball + tilt / 10, -ball)]
+    for trend, kind in ((tilt, "plane"), (-(X**2) / 300 + tilt, "paraboloid"), *spheres):
         surface = cr.surface.Surface(trend + NOISE, PIXEL)
-        assert f'explains 100 % of the variance of the heights: detrend="{kind}"' in str(
-            surface.warnings
-        )
+        said = f'explains 100 % of the variance of the heights: detrend="{kind}"'
+        assert said in str(surface.warnings)
         assert "warning" in repr(surface)
         assert surface.detrend(kind).warnings == ()
     assert surface.detrend("plane").warnings[0].startswith("a sphere of radius -2")
@@ -116,14 +110,11 @@ def test_a_map_pressed_whole_is_hertz_where_it_is_smooth() -> None:
     across = np.argwhere(cr.surface.press_whole(flat, ellipsoid).pressures > 0)
     height, width = np.ptp(across, axis=0) + 1
     assert_allclose(1.2 * height / width, 1.2 ** (2 / 3), rtol=0.04)  # Johnson 1985, eq. 4.28
-    for approach, said in (
-        (3.0, "contact at the edge of the map.*or no --whole"),
-        (1e-12, "no pixel that"),
-    ):
-        low = cr.surface.Surface(flat.heights - 1e-6, (1.0, 1.2))
-        deep = cr.press(scene(low), approach=approach)
+    low = cr.surface.Surface(flat.heights - 1e-6, (1.0, 1.2))
+    edge = "contact at the edge of the map.*or no --whole"
+    for approach, said in ((3.0, edge), (1e-12, "no pixel that")):
         with pytest.raises(cr.InputError, match=said):
-            cr.surface.press_whole(low, deep)
+            cr.surface.press_whole(low, cr.press(scene(low), approach=approach))
 
 
 def test_holes_become_soap_films() -> None:

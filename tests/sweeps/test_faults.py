@@ -149,10 +149,8 @@ def test_an_interrupt_keeps_what_was_computed(tmp_path: Path, event: str) -> Non
     psutil.wait_procs(children)
     kept = len(cr.open_sweep(tmp_path / "a-sweep"))
     more = "; the same command with --resume computes the rest" if kept else ""
-    assert process.returncode == 130
-    assert said == (
-        f"convexrough: interrupted: {kept:,} of 4,000 scenes are kept in a-sweep{more}\n"
-    )
+    kept_here = f"{kept:,} of 4,000 scenes are kept in a-sweep{more}"
+    assert (process.returncode, said) == (130, f"convexrough: interrupted: {kept_here}\n")
     assert kept > 0 or "parquet" not in event
     assert not list((tmp_path / "a-sweep/parts").glob(".*"))
 

@@ -105,11 +105,8 @@ WRONG = [
      '[asperities] heigth_std: unknown key, did you mean "height_std"?'),
     (sweeping(seeds=1, draw={"sphere.radius": {"uniform": [2, 1]}}),
      "uniform = [low, high] with low < high"),
-    (
-        tables(sweep={"measure": ["los"]}),
-        'measure: found "los", expected a number of the tables [normal], [cycle]: did you mean '
-        '"loss"?',
-    ),
+    (tables(sweep={"measure": ["los"]}), 'measure: found "los", expected a number of the tables '
+     '[normal], [cycle]: did you mean "loss"?'),
     ({**tables(cycle=None, friction=None), "sweep": {"measure": ["onset"]}},
      "friction: found none, expected a coefficient"),
 ]  # fmt: skip

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scene_files import scene_text
-from scenes import MATERIAL, hexagonal, paper
+from scenes import hexagonal, paper
 from sweep_files import SMALL, numbers, same, sweeping, swept, tables, toml
 
 import convexrough as cr
@@ -61,9 +61,7 @@ def test_rows_are_those_of_single_scenes() -> None:
         contact = cr.press(scene, load=rows["normal.load"][i])
         P, proof = 0.5 * contact.load, contact.certificate
         first, second = cr.cycles(contact, P * np.array([0.37, 0.5]), P * np.array([-0.37, 0.1]))
-        loads, forces = cr.elliptic_path(
-            load=3e-7, load_amplitude=5e-8, force_amplitude=4e-8, friction=0.5
-        )
+        loads, forces = cr.elliptic_path(**ALL["steady"]["ellipse"], friction=0.5)
         closed = cr.steady(scene, loads=loads, forces=forces)
         expected = {
             "contact": (contact.status == "contact").sum(),
@@ -86,13 +84,10 @@ def test_rows_are_those_of_single_scenes() -> None:
             assert rows[name][i] == pytest.approx(value, rel=0.0, abs=rounding), name
 
 
-@pytest.mark.parametrize(
-    "cycle",
-    [
-        {"maximum_fraction": [0.37, 1.0], "minimum_fraction": [-0.37, 0.1]},
-        {"displacement": [1e-6, 2e-6]},  # not together
-    ],
-)
+TOGETHER = {"maximum_fraction": [0.37, 1.0], "minimum_fraction": [-0.37, 0.1]}
+
+
+@pytest.mark.parametrize("cycle", [TOGETHER, {"displacement": [1e-6, 2e-6]}])
 def test_rows_together_are_those_of_scenes_one_by_one(cycle: dict[str, list[float]]) -> None:
     """Where only numbers of contacts and cycles are asked for, scenes are computed together."""
     contents = {k: v for k, v in ALL.items() if k not in ("shear", "history", "steady")}
@@ -116,8 +111,7 @@ def test_rows_together_are_those_of_scenes_one_by_one(cycle: dict[str, list[floa
 
 
 def test_scenes_made_in_python() -> None:
-    base = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
-    scenes = [cr.Scene(R, base, MATERIAL, 0.5, geometry="summit") for R in (0.9, 1.0, 1.1)]
+    scenes = [replace(paper(), sphere_radius=R, friction=0.5) for R in (0.9, 1.0, 1.1)]
     loads = [1e-7, 2e-7, 3e-7]
     table = swept(scenes, load=loads, cycle=[0.3], measure=["approach", "loss"])
     assert table.columns[1:5] == ["normal.load", "seed", "status", "message"]

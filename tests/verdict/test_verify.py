@@ -42,9 +42,8 @@ def test_what_is_right(command: Any, contact: cr.Contact, scene: str) -> None:
     outcome = command("verify", scene, claim(contact), "--within", "1e-10")
     assert (outcome.status, outcome.err) == (0, "")
     said = [line for line in outcome.out.splitlines() if line]
-    assert " ".join(line[:18].strip() for line in said[1:8]) == (
-        "geometry contact modulus result wrong statuses undecided load error total load"
-    )
+    heads = "geometry contact modulus result wrong statuses undecided load error total load"
+    assert " ".join(line[:18].strip() for line in said[1:8]) == heads
     assert re.search(r" proved; loads correct to within \S+e-1\d of the largest load$", said[3])
     assert [line[18:] for line in said[4:6]] == ["none"] * 2
     assert re.match(r"at most \S+e-1\d of the largest load \(1e-10 allowed\)", said[6][18:])
@@ -117,9 +116,8 @@ def test_json_and_files(command: Any, contact: cr.Contact, tmp_path: Path) -> No
     row = found["asperities"][36]
     assert (row["claimed"], row["status"], row["suspect"]) == ("open", "contact", 1)
     assert row["load_error"] >= row["solution"] > 0
-    assert {path.name for path in folder.iterdir()} == {
-        "files.json", "verdict.csv", "verdict.json", "verdict.png",
-    }  # fmt: skip
+    written = {path.name for path in folder.iterdir()}
+    assert written == {"files.json", "verdict.csv", "verdict.json", "verdict.png"}
     assert found == json.loads((folder / "verdict.json").read_text())
     written = rows(folder / "verdict.csv")[36]
     assert (written["claimed"], written["suspect"]) == ("open", "1")
