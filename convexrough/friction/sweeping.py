@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from convexrough import threads
 from convexrough.arrays import Array, Indices
 from convexrough.influence.coupling import Influence
+from convexrough.influence.lattice import LatticeInfluence
 from convexrough.roundoff import ROUNDOFF
 
 T = TypeVar("T")
@@ -49,21 +50,18 @@ def corner(d: NDArray[np.complex128]) -> list[Array]:
 
 # All numbers here are heuristics.
 
-#: Equal weights, where the moments of `around` are then 0, as on hexagonal and square lattices; and
-#: weights by the linear program.
-EQUAL, LIGHTEST = "equal", "lightest"
-
-#: Numbers of neighbours, and moments of the weights or one of these names. They are tried until the
-#: bound 1 - q_i suffices. A try also uses the asperities that determined q_i in earlier tries.
-TRIES: tuple[tuple[int, Moments | str], ...] = (
-    (6, EQUAL), (4, EQUAL), (12, around), (10, edge), (18, around), (14, corner), (18, edge),
-    (32, around), (32, edge), (60, around), (60, edge), *3 * ((60, LIGHTEST),),
+#: Numbers of neighbours, and moments of the weights; None for weights by the linear program. They
+#: are tried until the bound 1 - q_i suffices. A try also uses the asperities that determined q_i in
+#: earlier tries.
+TRIES: tuple[tuple[int, Moments | None], ...] = (
+    (12, around), (10, edge), (18, around), (14, corner), (18, edge), (32, around), (32, edge),
+    (60, around), (60, edge), *3 * ((60, None),),
 )  # fmt: skip
 
 MORE, FEW = 32, 300  # more than MORE neighbours are tried only if at most FEW asperities remain
 ALONE = 6  # neighbours of an asperity outside the contact that are tried, each alone
-NEAR = 8  # where (7) proves (6) far away, (6) is computed for NEAR times as many as have weights
-NEAR_EQUAL = 24  # the number of asperities for which (6) is computed if the weights are equal
+NEAR = 8  # where (7) proves (6) far away, (6) is computed for NEAR times as many as have weights,
+WIDER = 3  # and where it does not prove it then, for WIDER times as many, or else for all
 SEARCHES = 15  # systems solved for weights; each leaves out earlier neighbours of negative weight
 SAMPLE = 300  # the linear program considers about twice as many asperities
 TURN = 0.4  # angle from the two lines of a corner to a line perpendicular to the dipole
@@ -83,6 +81,8 @@ def swept_rates(influence: Influence, c: Array, rates: Array, spare: Array) -> A
         return rates
     rates, least = rates.copy(), np.where(c > 0, 0.0, -spare)
     swept = _Swept(influence, support, influence.scale * c)
+    if isinstance(influence, LatticeInfluence):
+        rates = np.maximum(rates, swept.rings(influence))
     others = others[~(rates[others] > least[others])]
     rates[others] = swept.outside(others)
     for group in (support, others):
@@ -181,6 +181,37 @@ class _Swept:
         found = (clear & (nearer > 2 * self.lost * self.extent**2)).any(axis=1)
         return np.where(found, self.lost / 2, -np.inf)
 
+    def rings(self, influence: LatticeInfluence) -> Array:
+        """(n,) lower bounds on rates by equal weights on the nearest sites of a lattice; -inf where
+        they do not all touch, or if D and S are not 0 for these weights.
+        """
+        found, basis = np.full(len(self.places), -np.inf), influence.box.basis
+        unit = influence.lattice.spacing
+        steps = np.argwhere(np.ones((7, 7))) - 3  # from i to other sites
+        steps = steps[steps.any(axis=1)]
+        d = (steps @ basis) @ [1.0, 1j]
+        reach = 4.0 * abs(np.linalg.det(basis)) / np.hypot(*basis.T).max()  # of all nearer sites
+        ring = np.flatnonzero(np.abs(d) < 1.01 * np.abs(d).min())
+        z, w = d[ring], 1.0 / len(ring)
+        third = 3 / 8 * abs(np.sum(np.abs(z) ** 2 * z)) + 5 / 8 * abs(np.sum(z**3))
+        rest = np.sum(np.abs(z) ** 4 / (reach - np.abs(z)))
+        kappa = w * (np.sum(np.abs(z) ** 2) / 4 - (third + rest) / reach)
+        if abs(z.sum()) + abs((z * z).sum()) > 1e-9 or kappa < 1 / 64:
+            return found
+        apart = np.abs(d[:, None] - z)
+        potentials = (w / np.where(apart > 0.5, apart, np.inf)).sum(axis=1)  # without own shells
+        others = np.delete(np.abs(d) * potentials, ring)
+        q = max(1.0 / (1.0 + kappa / 2 * (unit / self.extent) ** 2), 1.0 / float(others.min()))
+        (rows, columns), (i, j) = influence.box.shape, influence.cells
+        field = np.zeros((rows + 2, columns + 2))
+        field[i + 1, j + 1] = self.shells / unit
+        radii = np.stack([field[i + 1 + a, j + 1 + b] for a, b in steps[ring]], axis=1)
+        known = radii.all(axis=1)
+        own = (np.abs(z) * (potentials[ring] + w / radii[known])).min(axis=1)
+        lost = self.lost + 16 * influence.site_error
+        found[known] = 1.0 - (1.0 + lost) * np.maximum(q, 1.0 / own)
+        return found
+
     def improve(self, rates: Array, which: Indices, least: Array) -> None:
         """Increase the bounds `rates` (n,) of asperities, try by try, until they exceed `least`."""
         worst = near = np.empty((len(which), 0), dtype=np.intp)
@@ -188,23 +219,20 @@ class _Swept:
             if len(which) == 0 or (count > MORE and len(which) > FEW):
                 break
             width = count + worst.shape[1]
-            checked = NEAR_EQUAL if moments == EQUAL else NEAR * width
+            checked = NEAR * width
             if near.shape[1] < min(checked, len(self.support) - 1):
                 near = self.neighbours(which, checked)
             charged = np.column_stack((near[:, :count], worst))
-            if moments == EQUAL:
-                weights = self.equal(which, charged)
-            elif callable(moments):
+            if moments is None:
+                weights = self.lightest(which, charged)
+            else:
                 make = partial(self.weights, moments)
                 weights = _in_parts(make, (width + 5) ** 2, which, charged)
-            else:
-                weights = self.lightest(which, charged)
             rates[which], failed = self.rates(
                 which, charged, weights, least[which], near[:, :checked]
             )
             todo = ~(rates[which] > least[which])
-            if moments != EQUAL:
-                worst = np.column_stack((worst, failed))
+            worst = np.column_stack((worst, failed))
             which, worst, near = which[todo], worst[todo], near[todo]
 
     def weights(self, moments: Moments, which: Indices, near: Indices) -> Array:
@@ -245,15 +273,6 @@ class _Swept:
         weights[off > 1e-9] = 0.0
         return weights
 
-    def equal(self, which: Indices, near: Indices) -> Array:
-        """(m, s) equal weights of the neighbours `near`, where the moments of `around` are 0."""
-        d = self.places[near] - self.places[which][:, None]
-        size = np.abs(d).max(axis=1)
-        off = np.abs(d.sum(axis=1)) / size + np.abs((d * d).sum(axis=1)) / size**2
-        weights = np.zeros(near.shape)
-        weights[off < 1e-9] = 1.0
-        return weights
-
     def lightest(self, which: Indices, near: Indices) -> Array:
         """(m, s) weights of the neighbours `near` with the least q_i at a sample of asperities."""
         from scipy.optimize import linprog
@@ -278,23 +297,34 @@ class _Swept:
         """
         rates, worst = np.full(len(which), -np.inf), near[:, 0].copy()
         known = np.flatnonzero(weights.any(axis=1))
-        mine, near = which[known], near[known]
+        mine, near, stretched = which[known], near[known], 1.0 + self.lost
         weights = weights[known] / weights[known].sum(axis=1, keepdims=True)
-        seen = seen[known]
-        cost = near.shape[1] * seen.shape[1]
-        ratios = _in_parts(self._ratios, cost, mine, near, weights, seen)
-        rows, smallest = np.arange(len(known)), ratios.argmin(axis=1)
-        q, worst[known] = 1.0 / ratios[rows, smallest], seen[rows, smallest]
-        gains, stretched = self.gains(mine, near, weights, seen[:, -1]), 1.0 + self.lost
-        left = np.flatnonzero((gains == 0) & (1.0 - stretched * q > least[known]))
-        q = np.where(gains > 0, np.maximum(q, 1.0 / (1.0 + gains)), np.inf)
-        q[left], worst[known[left]] = self._everywhere(mine[left], near[left], weights[left])
+        q, gains = np.zeros((2, len(known)))
+
+        def check(some: Indices, seen: Indices) -> None:
+            """Set q_i by (6) for the asperities `seen`, and g by (7) for all farther ones."""
+            given = mine[some], near[some], weights[some]
+            ratios = _in_parts(self._ratios, near.shape[1] * seen.shape[1], *given, seen)
+            rows, smallest = np.arange(len(some)), ratios.argmin(axis=1)
+            q[some], worst[known[some]] = 1.0 / ratios[rows, smallest], seen[rows, smallest]
+            gains[some] = self.gains(*given, seen[:, -1])
+
+        def left(wanted: NDArray[np.bool_]) -> Indices:
+            return np.flatnonzero(wanted & (1.0 - stretched * q > least[known]))
+
+        check(np.arange(len(known)), seen[known])
+        some = left(gains == 0)
+        check(some, self.neighbours(mine[some], WIDER * seen.shape[1]))
+        some = left(gains <= 0)
+        q = np.where(gains > 0, np.maximum(q, 1.0 / (1.0 + np.maximum(gains, 0.0))), np.inf)
+        q[some], worst[known[some]] = self._everywhere(mine[some], near[some], weights[some])
         rates[known] = 1.0 - stretched * q
         return rates, worst
 
     def gains(self, which: Indices, near: Indices, weights: Array, last: Indices) -> Array:
         """(m,) g > 0 for which, by (7), q_i = 1 / (1 + g) satisfies (6) for all k at least as far
-        from i as the asperity `last`; 0 where (7) does not prove this.
+        from i as the asperity `last`; else 0 where (7) may prove this from a larger distance on,
+        and -1 elsewhere.
         """
         d = self.places[near] - self.places[which][:, None]
         apart = np.where(weights > 0, np.abs(d), 0.0)
@@ -324,7 +354,8 @@ class _Swept:
         both = np.where(edge, np.maximum(both, 3 / 4 * across - np.maximum(m, 0.0)), both)
         kappa = square / 4 + both - (third + rest) / r
         # Where kappa > square / 64, kappa / 2 is far larger than its rounding error.
-        return np.asarray(np.where(kappa > square / 64, kappa / 2 / self.extent**2, 0.0))
+        farther = np.where(square / 4 + both > square / 16, 0.0, -1.0)
+        return np.where(kappa > square / 64, kappa / 2 / self.extent**2, farther)
 
     def _ratios(self, which: Indices, near: Indices, weights: Array, seen: Indices) -> Array:
         """(m, k) sum_j w_j A_jk (with the shell's potential if j = k) over A_ik for k in `seen`."""
