@@ -67,12 +67,20 @@ class SlicedMatrix:
         m, starts = len(here.high), range(0, n, BLOCK)
         slices = (np.empty((m, n)), np.empty((m, n)), np.empty((m, n)))
         largest, sizes = np.empty((len(starts), m)), np.empty((3, len(starts), m))
+        inverse = Pair(slices[0], slices[2])  # first these arrays hold 1 / r
+
+        def fill(some: slice) -> None:
+            columns = slice(some.start if m == n else 0, n)
+            found = inverse_distances(here.at(some), points.at(columns))
+            for whole, part in zip(inverse, found, strict=True):
+                whole[some, columns] = part
+                if m == n:  # the matrix is symmetric
+                    whole[columns, some] = part.T
 
         def cut(some: slice) -> None:
-            inverse = inverse_distances(here.at(some), points)
             for block, start in enumerate(starts):
                 columns = np.s_[:, start : start + BLOCK]
-                high, low = inverse.at(columns)
+                high, low = (part[some][columns].copy() for part in inverse)
                 most = largest[block, some] = high.max(axis=1)
                 unit = _unit(most)[:, None]
                 first = rounded(high, unit)
@@ -83,7 +91,8 @@ class SlicedMatrix:
                     slices[k][some][columns] = each
                     sizes[k, block, some] = np.abs(each).sum(axis=1)
 
-        threads.each(cut, threads.chunks(m, max(ROWS, PIECE // n)), threads.worthwhile(m * n))
+        for work in (fill, cut):
+            threads.each(work, threads.chunks(m, max(ROWS, PIECE // n)), threads.worthwhile(m * n))
         sizes *= UP
         most = (np.maximum(sizes[0], sizes[1] * 2.0**SECOND) / _unit(largest)).max(axis=1)
         bits = np.minimum(53 - np.frexp(most)[1], MOST_BITS).tolist()
