@@ -258,8 +258,9 @@ def known(points: Array, tails: Array | None, point_error: float) -> tuple[Pair,
 def dense_matrix(points: Array, scale: float) -> Array:
     """The matrix (n, n) of A_ij = scale / r_ij; raises InputError if it does not fit in memory."""
     checks.fits_in_memory("asperities that could touch", len(points), 5 * 8, power=2)
-    matrix = inverse_distances(points, points)
-    matrix *= scale
+    matrix = np.empty((len(points), len(points)))
+    for some in _rows(*matrix.shape):
+        np.multiply(inverse_distances(points[some], points), scale, out=matrix[some])
     return matrix
 
 
@@ -271,8 +272,8 @@ def entry_error(point_error: float, nearest: float) -> float:
 
 
 def _rows(count: int, columns: int) -> Iterator[slice]:
-    """Slices of the rows of a matrix, of about 2^22 entries each."""
-    return threads.chunks(count, max(1, 2**22 // max(1, columns)))
+    """Slices of the rows of a matrix, of about 2^15 entries each, which fit in the cache."""
+    return threads.chunks(count, max(1, 2**15 // max(1, columns)))
 
 
 def squared_distances(points: Array, others: Array) -> Array:
