@@ -64,7 +64,6 @@ NEAR = 8  # where (7) proves (6) far away, (6) is computed for NEAR times as man
 WIDER = 3  # and where it does not prove it then, for WIDER times as many, or else for all
 SEARCHES = 15  # systems solved for weights; each leaves out earlier neighbours of negative weight
 SAMPLE = 300  # the linear program considers about twice as many asperities
-TURN = 0.4  # angle from the two lines of a corner to a line perpendicular to the dipole
 DIRECTIONS = 256  # directions in which the extent of the support is computed
 ROWS, NUMBERS = 2**14, 2**18  # asperities treated together, and float64 numbers in an array
 
@@ -336,13 +335,7 @@ class _Swept:
         first, here = (weights * d).sum(axis=1), self.places[which]
         size, square, rounding = np.abs(first), total(apart**2), self.lost * total(apart)
 
-        def behind(direction: NDArray[np.complex128]) -> Array:
-            past = (direction.conj() * here).real - self._least_along(direction)
-            return np.asarray(past + rounding * self.extent)
-
-        m = behind(first)
-        turned = first * np.exp(1j * TURN), first * np.exp(-1j * TURN)
-        ahead = size * r * np.sin(TURN) - np.maximum(*map(behind, turned)).clip(0.0)
+        m = (first.conj() * here).real - self._least_along(first) + rounding * self.extent
         third = 3 / 8 * total(apart**2 * d) + 5 / 8 * total(d**3)
         with np.errstate(divide="ignore", invalid="ignore"):
             rest = total(apart**4 / np.maximum(r[:, None] - apart, 0.0))
@@ -350,7 +343,7 @@ class _Swept:
             beyond = np.maximum(m, 0.0) / size / r
             across = s.real * (1.0 - 2.0 * beyond**2) - 2.0 * np.abs(s.imag) * beyond
         edge = (s.real >= 0) & (size * r >= 1.5 * np.abs(s))
-        both = np.maximum(-m, np.where(ahead >= 0, ahead, -np.inf)) - 3 / 4 * total(d**2)
+        both = -m - 3 / 4 * total(d**2)
         both = np.where(edge, np.maximum(both, 3 / 4 * across - np.maximum(m, 0.0)), both)
         kappa = square / 4 + both - (third + rest) / r
         # Where kappa > square / 64, kappa / 2 is far larger than its rounding error.
