@@ -100,7 +100,8 @@ def loops_figure(
             draw_loop(axes, scale, loop, slope)
         end = loop.displacements[0] - slope * loop.forces[0]
         place = (x.of(end), q.of(loop.forces[0]))
-        style.note(upright, _range(cycle, scale), place, (4, 2), fontsize=7, va="center")
+        look = {"fontsize": 7, "va": "center", "path_effects": style.HALO}
+        style.note(upright, _range(cycle, scale), place, (4, 2), **look)
     in_units = x.said and not x.symbol
     less = f"$X\\,/\\,{x.symbol} - \\frac{{2}}{{3}}\\,Q\\,/\\,(fP)$"
     style.label(whole, x.short("X"), q.short("Q"))
