@@ -210,8 +210,7 @@ def scene_of(data: Mapping[str, Any]) -> Scene:
 def stored() -> dict[str, Any]:
     """The scenes and answers of the file `DATA`, by name."""
     text = files("convexrough.gallery").joinpath(DATA).read_text(encoding="utf-8")
-    found: dict[str, Any] = json.loads(text)
-    return found
+    return dict(json.loads(text))
 
 
 def _reversals(kind: str) -> list[float]:

@@ -72,8 +72,7 @@ def cycle_figures(
     named = [(f"{scale.length.of(r[i]):.3g}", i) for i in asperities]
     some = [cycles[i] for i in shown]
     theirs = steady_loops(some, POINTS, asperities) if loops is None else [loops[i] for i in shown]
-    meaning = scale.length.short("r")
-    figure = loops_figure(some, theirs, named, meaning, scale, len(cycles))
+    figure = loops_figure(some, theirs, named, scale.length.short("r"), scale, len(cycles))
     figures = Figures({"hysteresis": figure})
     if several:
         figures["loss"] = _loss_figure([cycles[i] for i in order], scale)

@@ -158,8 +158,7 @@ class SteadyStage(_Points):
                 shape = self.ellipse.model_dump(exclude={"phase", "chords"})
                 how = {name: self.reference * size for name, size in shape.items()}
                 how |= {"chords": self.ellipse.chords, "influence": influence}
-                losses = phase_losses(scene, phases=self.phases, factors=self.factors, **how)
-                found.append(losses)
+                found.append(phase_losses(scene, phases=self.phases, factors=self.factors, **how))
             return SteadyResult(self, contact, tuple(found))
 
 
