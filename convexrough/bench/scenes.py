@@ -6,14 +6,12 @@ from typing import Any, Literal
 
 import numpy as np
 
+from convexrough.paper.example import APPROACH as APPROACH
+from convexrough.paper.example import scene_of
 from convexrough.scene.asperities import Asperities
-from convexrough.scene.material import Material
 from convexrough.scene.scene import Scene
 
 Family = Literal["lattice", "rough", "scattered"]
-
-#: The paper's approach, in units of the sphere's radius.
-APPROACH = 5e-5
 
 #: A hexagonal lattice of equal asperities; the same with random heights (standard deviation 1e-6 R)
 #: and tip radii (10 %); the first with asperities moved at random by up to 0.15 of the spacing.
@@ -37,10 +35,4 @@ def scene(family: Family, refinement: float) -> Scene:
         angle = 2.0 * np.pi * random.random(len(asperities))
         moved = distance[:, None] * np.column_stack((np.cos(angle), np.sin(angle)))
         asperities = Asperities(asperities.positions + moved, tip_radius)
-    return Scene(
-        1.0,
-        asperities,
-        Material(contact_modulus=1.0, poisson_ratio=0.3),
-        friction=0.5,
-        geometry="summit",
-    )
+    return scene_of(asperities)

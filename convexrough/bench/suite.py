@@ -181,6 +181,6 @@ def write_bench(new: Writer, bench: Bench, *, figures: bool, page: Path | None) 
         text = page_text(page, bench)
         with file_errors(pictures := page.parent / "figures", "be made"):
             pictures.mkdir(exist_ok=True)
-        pictured = Writer(pictures, pictures, ("png",), 200)
+        pictured = Writer(pictures, pictures)
         pictured.figures(both)
         new.files += [*pictured.files, write_text(page, text)]

@@ -147,8 +147,7 @@ def gallery(
         from convexrough.bench.profile import profile_of
 
         with common.progress("timing"):
-            chosen = [solver_named(each) for each in solvers]
-            found = profile_of(chosen or None, cases=wanted)
+            found = profile_of([solver_named(each) for each in solvers] or None, cases=wanted)
         table = found.rows()
         cells = [[f"{x:.0%}" if isinstance(x, float) else x for x in row.values()] for row in table]
         reported = [

@@ -137,8 +137,7 @@ def summits(
         raise FileError(f"{folder}: expected the name of a folder, not of a table")
     reads = [surface, *([how.scene] if how.scene else [])]
     inputs = {str(each): digest(each) for each in reads}
-    said: dict[str, Any] = {"inputs": inputs, "versions": versions()}
-    with output.folder(folder, reads=reads, **said) as new:
+    with output.folder(folder, reads=reads, inputs=inputs, versions=versions()) as new:
         with common.progress(f"reading {surface}"):
             scan = read(surface, detrend=None if detrend == "none" else detrend, **options)
             with blamed_on(surface):

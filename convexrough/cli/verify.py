@@ -140,8 +140,7 @@ def verify(
     if explain and (output.out or junit or output.proof):
         raise click.UsageError("--explain checks nothing: leave out --out, --junit and --proof.")
     if junit is not None and junit.suffix.lower() != ".xml":
-        found_ending = junit.suffix or "no ending"
-        raise FileError(f"--junit {junit}: found {found_ending}, expected .xml")
+        raise FileError(f"--junit {junit}: found {junit.suffix or 'no ending'}, expected .xml")
     alone = [Path("proof.json")] if output.proof and output.out is None else []
     for each in [*alone, *([junit] if junit else [])]:
         if each.exists() and not output.force:

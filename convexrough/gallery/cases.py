@@ -129,7 +129,7 @@ class HardCase(Record):
         """
         given = checks.array("loads", loads, length=len(self))
         claimed = given > checks.non_negative("floor", floor)
-        return _judged(given, self.loads, claimed, self.touching, within)
+        return self._judged(given, self.loads, claimed, within)
 
     def check_shear(self, forces: ArrayLike, *, within: float = 1e-6) -> Checked:
         """The comparison of shear forces (n,) [force], at the end of `history`, with the answer.
@@ -142,26 +142,21 @@ class HardCase(Record):
             found = "a case in which an asperity loses load as the total load rises"
             raise InputError("forces", found=found, expected="a case with an answer in shear")
         given = checks.array("forces", forces, length=len(self))
-        return _judged(given, self.forces, given != 0, self.touching, within)
+        return self._judged(given, self.forces, given != 0, within)
 
-
-def _judged(
-    given: Array,
-    digits: Sequence[str],
-    claimed: NDArray[np.bool_],
-    touching: NDArray[np.bool_],
-    within: float,
-) -> Checked:
-    """The comparison, in exact arithmetic, because some errors are below float64's rounding."""
-    exact = [Fraction(each) for each in digits]
-    apart = max(abs(Fraction(float(a)) - b) for a, b in zip(given, exact, strict=True))
-    largest = max(map(abs, exact))
-    return Checked(
-        wrongly_open=frozen(np.flatnonzero(touching & ~claimed)),
-        wrongly_loaded=frozen(np.flatnonzero(claimed & ~touching)),
-        error=float(apart / largest) if largest else float(apart),
-        within=checks.positive("within", within),
-    )
+    def _judged(
+        self, given: Array, digits: Sequence[str], claimed: NDArray[np.bool_], within: float
+    ) -> Checked:
+        """The comparison, in exact arithmetic, because some errors are below float64's rounding."""
+        exact = [Fraction(each) for each in digits]
+        apart = max(abs(Fraction(float(a)) - b) for a, b in zip(given, exact, strict=True))
+        largest = max(map(abs, exact))
+        return Checked(
+            wrongly_open=frozen(np.flatnonzero(self.touching & ~claimed)),
+            wrongly_loaded=frozen(np.flatnonzero(claimed & ~self.touching)),
+            error=float(apart / largest) if largest else float(apart),
+            within=checks.positive("within", within),
+        )
 
 
 def names(*wanted: str) -> tuple[str, ...]:
@@ -215,8 +210,7 @@ def scene_of(data: Mapping[str, Any]) -> Scene:
 def stored() -> dict[str, Any]:
     """The scenes and answers of the file `DATA`, by name."""
     text = files("convexrough.gallery").joinpath(DATA).read_text(encoding="utf-8")
-    found: dict[str, Any] = json.loads(text)
-    return found
+    return dict(json.loads(text))
 
 
 def _reversals(kind: str) -> list[float]:

@@ -20,6 +20,7 @@ from convexrough.run.stages import CycleStage, NormalStage, ShearStage
 from convexrough.scene.rings import rings
 from convexrough.tabular.columns import aligned
 
+#: The paper's approach.
 APPROACH = 5e-5
 
 #: The paper's rings, from the centre outwards, each with its number of asperities.
@@ -81,7 +82,11 @@ class PaperStates:
 
 def scene() -> cr.Scene:
     """The paper's scene, with all asperities that the undeformed sphere overlaps."""
-    asperities = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102)
+    return scene_of(cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.0102))
+
+
+def scene_of(asperities: cr.Asperities) -> cr.Scene:
+    """The paper's sphere, material and friction, with these asperities."""
     material = cr.Material(contact_modulus=1.0, poisson_ratio=0.3)
     return cr.Scene(1.0, asperities, material, friction=0.5, geometry="summit")
 

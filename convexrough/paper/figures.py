@@ -74,8 +74,7 @@ def _rings_figure(found: PaperStates, scale: Scale) -> Figure:
     limit = f"$fP$ = {style.quantity(scale.limit, '')}"
     style.label(bars, f"$Q\\,/\\,(fP)$  ({limit})", "ring (asperities)")
     style.title(bars, "light: stick in part; dark: slide")
-    bars.annotate("from", (1.02, 1.0), xytext=(0, 6), va="baseline", fontsize=TICK,
-                  textcoords="offset points", xycoords="axes fraction")  # fmt: skip
+    style.note(bars, "from", (1.02, 1.0), (0, 6), va="baseline", xycoords="axes fraction")
     handles = legend_handles([found.half], scale)
     style.legend(figure, "outside", handles=handles, loc="outside upper center", ncols=4)
     return figure
@@ -196,8 +195,7 @@ def _letters(axes: Axes, names: list[str], heights: Array) -> None:
         placed[:-1] -= close / 2
         placed[1:] += close / 2
     for k, y in zip(order, placed, strict=True):
-        axes.annotate(names[k], (1.0, y), xytext=(6, 0), textcoords="offset points", va="center",
-                      fontsize=TICK, annotation_clip=False)  # fmt: skip
+        style.note(axes, names[k], (1.0, y), (6, 0), va="center", annotation_clip=False)
 
 
 def _loss_figure(found: PaperStates, scale: Scale) -> Figure:
@@ -217,16 +215,13 @@ def _loss_figure(found: PaperStates, scale: Scale) -> Figure:
     zoom.set(xlim=tuple(window), ylim=(low, high))
     box = Rectangle((window[0], low), np.ptp(window), high - low, fill=False, ec=SMOOTH, lw=0.8)
     whole.add_patch(box)
-    whole.annotate("zoom", (float(window[1]), high), xytext=(-2, 3), textcoords="offset points",
-                   ha="right", va="bottom", fontsize=TICK)  # fmt: skip
+    style.note(whole, "zoom", (float(window[1]), high), (-2, 3), ha="right", va="bottom")
     crossing = found.crossing, float(np.interp(found.crossing, AMPLITUDES, smooth))
     zoom.axvline(READ_CROSSING, ls=DOTTED, lw=1.0, color=SMOOTH, label="_read")
     zoom.plot(*crossing, "o", ms=5, mfc="white", mec=UNSURE, mew=1.3, label="_crossing")
-    zoom.annotate(f"curves cross at {found.crossing:.3f}", crossing, xytext=(10, -14),
-                  textcoords="offset points", fontsize=TICK, color=UNSURE)  # fmt: skip
+    style.note(zoom, f"curves cross at {found.crossing:.3f}", crossing, (10, -14), color=UNSURE)
     said = f"read off the paper's\ngraph: about {READ_CROSSING:g}"
-    zoom.annotate(said, (READ_CROSSING, low), xytext=(4, 4), fontsize=TICK,
-                  textcoords="offset points", va="bottom")  # fmt: skip
+    style.note(zoom, said, (READ_CROSSING, low), (4, 4), va="bottom")
     style.label(whole, "amplitude of $Q\\,/\\,(fP)$", energy.label("W"))
     style.label(zoom, "amplitude of $Q\\,/\\,(fP)$", energy.short("W"))
     style.legend(whole, "inside")

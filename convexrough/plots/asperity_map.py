@@ -51,16 +51,22 @@ class Layer(NamedTuple):
 
 
 def draw_map(
-    axes: Axes, place: style.Place | Scale, layers: Sequence[Layer], *, room: Array | None = None
+    axes: Axes,
+    points: Array,
+    length: style.Measure,
+    layers: Sequence[Layer],
+    *,
+    outline: Sequence[float] = (),
+    room: Array | None = None,
 ) -> None:
     """Draw discs, and faint dots at points without a disc, in a square with a margin.
 
-    room : (n,) [length] radii of discs that must fit into the square; default: of those drawn
+    points  : (n, 2) [length];  outline : semi-axes [length] of an ellipse to outline
+    room    : (n,) [length] radii of discs that must fit into the square; default: of those drawn
 
     If there are `CROWDED` or more discs, a mosaic replaces discs and dots.
     """
-    length = place.length
-    points, outline = length.of(place.points), [length.of(axis) for axis in place.axes]
+    points, outline = length.of(points), [length.of(axis) for axis in outline]
     layers = [each._replace(radii=length.of(each.radii)) for each in layers]
     whole = np.max([np.zeros(len(points)), *(each.radii for each in layers)], axis=0)
     shown, fits = whole > 0, whole if room is None else length.of(room)
@@ -116,14 +122,15 @@ def draw_values(
         Layer("_inner discs" if k else "contact discs", radius, colours.to_rgba(each), rim)
         for k, (radius, each) in enumerate(zip(sizes, np.atleast_2d(values), strict=True))
     ]
-    draw_map(axes, scale, layers)
+    draw_map(axes, scale.points, scale.length, layers, outline=scale.axes)
     style.bar(axes, colours, name, above=not signed)
     return colours
 
 
 def draw_statuses(axes: Axes, contact: Contact, status: NDArray[np.str_]) -> None:
     """Draw the map of statuses with a legend."""
-    draw_map(axes, Scale(contact), status_layers(status, contact.contact_radii))
+    scale, layers = Scale(contact), status_layers(status, contact.contact_radii)
+    draw_map(axes, scale.points, scale.length, layers, outline=scale.axes)
     style.legend(axes, "below", handles=status_handles(status))
 
 

@@ -72,8 +72,7 @@ def cycle_figures(
     named = [(f"{scale.length.of(r[i]):.3g}", i) for i in asperities]
     some = [cycles[i] for i in shown]
     theirs = steady_loops(some, POINTS, asperities) if loops is None else [loops[i] for i in shown]
-    meaning = scale.length.short("r")
-    figure = loops_figure(some, theirs, named, meaning, scale, len(cycles))
+    figure = loops_figure(some, theirs, named, scale.length.short("r"), scale, len(cycles))
     figures = Figures({"hysteresis": figure})
     if several:
         figures["loss"] = _loss_figure([cycles[i] for i in order], scale)
@@ -100,7 +99,8 @@ def loops_figure(
             draw_loop(axes, scale, loop, slope)
         end = loop.displacements[0] - slope * loop.forces[0]
         place = (x.of(end), q.of(loop.forces[0]))
-        style.note(upright, _range(cycle, scale), place, (4, 2), fontsize=7, va="center")
+        look = {"fontsize": 7, "va": "center", "path_effects": style.HALO}
+        style.note(upright, _range(cycle, scale), place, (4, 2), **look)
     in_units = x.said and not x.symbol
     less = f"$X\\,/\\,{x.symbol} - \\frac{{2}}{{3}}\\,Q\\,/\\,(fP)$"
     style.label(whole, x.short("X"), q.short("Q"))

@@ -130,7 +130,8 @@ def _mark_points(axes: Axes, x: Array, y: Array) -> None:
         best = next((k for k, gap in enumerate(clear) if gap > 0.11), int(np.argmax(clear)))
         taken.append(places[best])
         offset = tuple((places[best] - spots[i]) * 72.0)
-        style.note(axes, text, (x[i], y[i]), offset, ha="center", va="center")
+        look = {"ha": "center", "va": "center", "path_effects": style.HALO}
+        style.note(axes, text, (x[i], y[i]), offset, **look)
 
 
 def _maps(path: LoadPath, scale: Scale) -> Figure:
@@ -141,9 +142,10 @@ def _maps(path: LoadPath, scale: Scale) -> Figure:
     figure, places = panels(DOUBLE, 0.5 + 1.9 * rows, rows, columns)
     scene, modulus = path.scene, path.scene.material.contact_modulus
     radii = hertz.contact_radius(path.asperity_loads, modulus, scene.relative_radii)
-    room, place = radii[chosen].max(axis=0), style.Place(scale.points, scale.length)
+    room = radii[chosen].max(axis=0)
     for axes, k in zip(places, chosen, strict=False):
-        draw_map(axes, place, status_layers(path.status[k], radii[k]), room=room)
+        layers = status_layers(path.status[k], radii[k])
+        draw_map(axes, scale.points, scale.length, layers, room=room)
         slide = np.count_nonzero(path.status[k] == "sliding")
         touch = np.count_nonzero(path.asperity_loads[k] > 0)
         style.title(axes, f"{k + 1}: {slide:,} of {touch:,} slide", "center")

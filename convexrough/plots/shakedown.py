@@ -55,7 +55,7 @@ def draw_factors(axes: Axes, found: Shakedown) -> None:
         Layer("known", radii, colours.to_rgba(np.nan_to_num(values))),
     ]
     length = style.measure(float(np.ptp(points)), found.scene.units.length)
-    draw_map(axes, style.Place(points, length), layers)
+    draw_map(axes, points, length, layers)
     ringed = "\nringed: the first to keep sliding" if first.any() else ""
     style.title(axes, f"{found.kind}: {found.factor:.5g}{ringed}")
     if high > low:

@@ -83,8 +83,8 @@ def _title(axes: Axes, state: State, scale: Scale, space: str) -> None:
 
 def draw_state(axes: Axes, state: State, scale: Scale) -> None:
     """Draw contact discs, stick discs and open dots, and the outlines of the smooth contact."""
-    radii = state.contact.contact_radii
-    maps.draw_map(axes, scale, maps.status_layers(state.status, radii, state.stick_radii))
+    layers = maps.status_layers(state.status, state.contact.contact_radii, state.stick_radii)
+    maps.draw_map(axes, scale.points, scale.length, layers, outline=scale.axes)
     left = max(1.0 - float(np.linalg.norm(state.force)) / scale.limit, 0.0)
     if 0 < left < 1:
         stick = [scale.length.of(np.cbrt(left) * each) for each in scale.axes]

@@ -5,6 +5,8 @@ Q is the shear force and f the coefficient of friction.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
@@ -38,8 +40,8 @@ def steady_figures(found: Cycle) -> Figures:
     """
     figure, (plane, chart) = panels(DOUBLE, 3.5, 1, 2)
     draw_closed(plane, found)
-    place = style.Place(found.scene.contact_points, Scale(found.contact).length)
-    draw_map(chart, place, status_layers(found.status, found.contact.contact_radii))
+    layers = status_layers(found.status, found.contact.contact_radii)
+    draw_map(chart, found.scene.contact_points, Scale(found.contact).length, layers)
     name_statuses(figure, found.status)
     lost = style.quantity(found.loss, found.scene.units.work)
     style.title(chart, f"each cycle after the first loses {lost}")
@@ -97,8 +99,8 @@ def draw_curve(axes: Axes, curve: MemoryCurve) -> None:
     front = unit.of(float(curve.front))
     axes.axvline(front, color=UNSURE, lw=0.9, ls=DASHED)
     side, ha = (-1, "right") if curve.front > curve.load / 2 else (1, "left")
-    axes.annotate("front", (front, 0.04), (3 * side, 0), xycoords=axes.get_xaxis_transform(),
-                  textcoords="offset points", fontsize=TICK, color=UNSURE, ha=ha)  # fmt: skip
+    above = axes.get_xaxis_transform()
+    style.note(axes, "front", (front, 0.04), (3 * side, 0), xycoords=above, color=UNSURE, ha=ha)
 
 
 def draw_closed(axes: Axes, found: Cycle) -> None:
@@ -107,7 +109,7 @@ def draw_closed(axes: Axes, found: Cycle) -> None:
     unit = label_plane(axes, float(found.loads.max()), found.scene.units.force)
     P, T = (np.append(each, each[0]) for each in (found.loads, found.forces / f))
     level, height = found.level, found.force_level / f
-    _draw_cross(axes, unit, level, height, P.max(), FAINT, 0.9)
+    _draw_cross(axes, unit, P.max(), level, height, color=FAINT, lw=0.9)
     axes.plot(unit.of(P), unit.of(T), color=ROUGH, lw=1.2)
     axes.plot([unit.of(level)], [unit.of(height)], "o", ms=5, color=UNSURE)
     style.title(axes, "dot: $(L^*, T^*)$; no change below $L^*$")
@@ -116,7 +118,7 @@ def draw_closed(axes: Axes, found: Cycle) -> None:
 def label_plane(axes: Axes, most: float, force_unit: str = "") -> style.Measure:
     """Label both axes and draw |T| = P (gross sliding). Returns the measure of both axes."""
     unit = style.measure(most, force_unit, "P_m")
-    _draw_cross(axes, unit, 0.0, 0.0, most, SMOOTH, 0.7)
+    _draw_cross(axes, unit, most, color=SMOOTH, lw=0.7)
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(style.round_ticks(5))  # does not depend on the layout
     T = "T = Q/f" if unit.said and not unit.symbol else "T"
@@ -127,17 +129,16 @@ def label_plane(axes: Axes, most: float, force_unit: str = "") -> style.Measure:
 def _draw_cross(
     axes: Axes,
     unit: style.Measure,
-    level: float,
-    height: float,
     most: float,
-    colour: str,
-    lw: float,
+    level: float = 0.0,
+    height: float = 0.0,
+    **look: Any,
 ) -> None:
     """Draw the lines T = height +- (P - level) from P = level to P = most."""
     P = np.array([level, most])
     for sign in (1.0, -1.0):
         T = height + sign * (P - level)
-        axes.plot(unit.of(P), unit.of(T), color=colour, lw=lw, ls=DASHED)
+        axes.plot(unit.of(P), unit.of(T), ls=DASHED, **look)
 
 
 def vertices(curve: MemoryCurve, unit: style.Measure) -> tuple[Array, Array]:

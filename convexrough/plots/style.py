@@ -21,7 +21,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from convexrough import checks
 from convexrough.arrays import Array, Number
@@ -36,6 +36,7 @@ SINGLE, DOUBLE = 3.5, 7.0  # inches: one and two columns of a journal
 COLOURS = "viridis_r"  # darkens steadily towards the peak, so that it also reads in grey
 ROUGH, UNSURE = "#2b5c8a", "#c1440e"
 SMOOTH, FAINT = "0.15", "0.65"  # greys
+HALO = (withStroke(linewidth=2.0, foreground="white"),)  # of texts on curves
 DASHED, DOTTED = (0, (4, 2.5)), (0, (1, 1.5))
 
 #: Options of the legends of axes, and of those of figures ("outside" all axes), by their places.
@@ -89,18 +90,15 @@ def round_ticks(most: int = 6, *, whole: bool = False) -> MaxNLocator:
 
 
 def note(axes: Axes, text: str, place: Any, offset: Any, **look: Any) -> None:
-    """Write a text with a white halo near a place, at an offset in points."""
-    halo = [withStroke(linewidth=2.0, foreground="white")]
-    axes.annotate(text, place, xytext=offset, textcoords="offset points", path_effects=halo,
-                  **{"fontsize": TICK, **look})  # fmt: skip
+    """Write a text near a place, at an offset in points."""
+    how = {"textcoords": "offset points", "fontsize": TICK, **look}
+    axes.annotate(text, place, xytext=offset, **how)
 
 
-def write_beside(axes: Axes, text: str, place: ArrayLike) -> None:
+def write_beside(axes: Axes, text: str, place: Any) -> None:
     """Write a small text next to a place, readable on any background."""
-    x, y = np.asarray(place)
     box = dict(boxstyle="round,pad=0.15", fc="white", ec="none", alpha=0.85)
-    axes.annotate(text, (x, y), xytext=(6, 6), textcoords="offset points", fontsize=TICK - 1,
-                  bbox=box, zorder=5)  # fmt: skip
+    note(axes, text, place, (6, 6), fontsize=TICK - 1, bbox=box, zorder=5)
 
 
 def say_nothing(axes: Axes, why: str = "no contact") -> None:
@@ -197,22 +195,12 @@ def _metric(unit: str) -> tuple[str, int] | None:
     return (name, power) if name and known.size * 10 ** (-power) == 1 else None
 
 
-class Place(NamedTuple):
-    """Where a map is: its points (n, 2) [length], and the measure of its axes.
-
-    axes : semi-axes [length] of the smooth contact, to be outlined about the origin; or ()
-    """
-
-    points: Array
-    length: Measure
-    axes: Sequence[float] = ()
-
-
 class Scale:
     """The measures of a contact's figures, and the smooth contact under the same load.
 
     sphere : the smooth sphere or ellipsoid, or None;  name : its name in legends
-    points, length, axes : as in `Place`;  centre : (2,) [length] origin of distances
+    points, length : (n, 2) [length] the contact points, and the measure of lengths
+    axes   : semi-axes [length] of the smooth contact, or ();  centre : (2,) origin of distances
     typical, peak : radius and peak pressure of the smooth contact, or r_c and mean pressure
     """
 

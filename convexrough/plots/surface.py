@@ -78,7 +78,7 @@ def draw_summit_map(axes: Axes, summits: Summits) -> None:
     every = np.ones(len(summits), dtype=bool)
     layer = Layer("summits", even_radii(summits.positions, every), SUMMIT)
     length = style.measure(float(np.ptp(summits.positions)) / 2, summits.unit)
-    draw_map(axes, style.Place(summits.positions, length), [layer])
+    draw_map(axes, summits.positions, length, [layer])
 
 
 def draw_provability(axes: Axes, curve: Provability) -> None:

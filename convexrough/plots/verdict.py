@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from convexrough.compare import Comparison
-from convexrough.friction.side_by_side import PathComparison, PathEntry
+from convexrough.friction.side_by_side import PathComparison
 from convexrough.normal.claims import Claim
 from convexrough.plots import asperity_map as maps
 from convexrough.plots import style
@@ -49,7 +47,7 @@ def draw_claim(axes: Axes, claim: Claim) -> None:
     status, points = claim.status, claim.of.asperities.positions
     length = style.measure(float(np.ptp(points)), claim.of.units.length)
     size = maps.even_radii(points, np.ones(len(points), dtype=bool))
-    maps.draw_map(axes, style.Place(points, length), maps.status_layers(status, size, looks=SHADES))
+    maps.draw_map(axes, points, length, maps.status_layers(status, size, looks=SHADES))
     handles = maps.status_handles(status, SHADES)
     marked = {**claim.wrong, "undecided": claim.undecided}
     for mark, (what, those) in zip("oX^", marked.items(), strict=True):
@@ -67,22 +65,20 @@ def draw_claim(axes: Axes, claim: Claim) -> None:
 
 def draw_times(axes: Axes, comparison: Comparison | PathComparison) -> None:
     """Draw a dot at the time of each entry; one without a result has its outcome as text."""
-    names, times = list[str](), list[float]()
-    entry: Any
-    for place, entry in enumerate(comparison.entries):
-        way = isinstance(entry, PathEntry)
-        names.append(entry.way if way else entry.solver)
-        found = entry.path if way else entry.contact
-        if found is None:
-            axes.text(0.02, place, entry.outcome, transform=axes.get_yaxis_transform(),
-                      va="center", fontsize=TICK, color=UNSURE)  # fmt: skip
+    columns = {name: values for name, (_, values) in comparison._variables().items()}
+    names = columns["way" if isinstance(comparison, PathComparison) else "solver"].tolist()
+    outcomes, seconds = columns["outcome"], columns["seconds"]
+    for place, (outcome, time) in enumerate(zip(outcomes, seconds, strict=True)):
+        if outcome == "answered":
+            axes.plot(time, place, "o", color=ROUGH, clip_on=False)
         else:
-            times.append(entry.seconds if way else found.seconds)
-            axes.plot(times[-1], place, "o", color=ROUGH, clip_on=False)
+            axes.text(0.02, place, outcome, transform=axes.get_yaxis_transform(),
+                      va="center", fontsize=TICK, color=UNSURE)  # fmt: skip
     axes.set(xscale="log", ylim=(len(names) - 0.5, -0.5))
     axes.set_yticks(range(len(names)), names, fontsize=TICK)
-    if times := [seconds for seconds in times if seconds]:  # whole decades: the axis is short
-        powers = np.floor(np.log10(min(times))), np.ceil(np.log10(1.01 * max(times)))
+    times = seconds[(outcomes == "answered") & (seconds > 0)]
+    if len(times):  # whole decades: the axis is short
+        powers = np.floor(np.log10(times.min())), np.ceil(np.log10(1.01 * times.max()))
         axes.set_xlim(*(10.0**power for power in powers))
         axes.xaxis.set_major_locator(LogLocator(numticks=4))
         axes.xaxis.set_minor_formatter(NullFormatter())

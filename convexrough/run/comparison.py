@@ -32,10 +32,9 @@ def _entry(entry: Entry) -> Summary:
             "different_contacts", "memory")  # fmt: skip
     row: Summary = {name: getattr(entry, name) for name in said}
     if (contact := entry.contact) is not None:
+        proof, work = ("scope", "load_error", "duality_gap"), ("iterations", "seconds", "influence")
         row |= numbers(contact, (*COUNTS, "approach", "load"))
-        row |= {"largest_load": float(contact.loads.max())}
-        row |= numbers(contact, ("scope", "load_error", "duality_gap"))
-        row |= numbers(contact, ("iterations", "seconds", "influence"))
+        row |= {"largest_load": float(contact.loads.max()), **numbers(contact, proof + work)}
     return row
 
 

@@ -181,8 +181,7 @@ class Study(FileTable):
     @property
     def stages(self) -> dict[str, Stage]:
         """The stages that the file requests, by name, in the order of results."""
-        found = {name: getattr(self, name) for name in STAGES}
-        return {name: stage for name, stage in found.items() if stage is not None}
+        return {name: it for name in STAGES if (it := getattr(self, name)) is not None}
 
     @classmethod
     def mistakes_between(cls, keys: Mapping[str, Any]) -> Iterator[Mistake]:

@@ -38,8 +38,6 @@ def draw_quantiles(
     rows = {name: values[good] for name, values in columns.items()}
     for (name, band), look in zip(_bands(rows, others), cycle(LOOKS), strict=False):
         _draw_band(axes, band[over], band[measured], name, look)
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.get_offset_text().set_fontsize(TICK)
     if failed := int(np.count_nonzero(~good)):
         axes.set_title(f"{failed:,} scenes failed", fontsize=TICK, loc="left")
     x = rows[over]

@@ -11,7 +11,7 @@ computed together, in common arrays with a row for each scene.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,9 +22,10 @@ from convexrough.contact import Contact, discs_of, total_area
 from convexrough.errors import ConvexroughError, InputError
 from convexrough.friction.onset import onset_of_sliding
 from convexrough.plausibility import cautions_about, cautions_of
+from convexrough.record import singular
 from convexrough.rows import PressedRows, in_rows
 from convexrough.run.scene_file import Task
-from convexrough.run.stage import Stage, limit, unit_of
+from convexrough.run.stage import STATUSES, Stage, limit, unit_of
 from convexrough.run.stages import CycleStage
 from convexrough.scene.scene import Scene
 from convexrough.sphere import mindlin
@@ -138,38 +139,12 @@ def unit(name: str, units: UnitNames) -> str:
     return "" if name.startswith("gradient.") else unit_of(name.rpartition(".")[2], units)
 
 
-#: Arrays with an entry or a row for each scene, by their names in `Contacts` or `Cycles`.
-Found = Mapping[str, Array]
-
-#: Numbers of summaries, as functions of the arrays of `Contacts` and `Cycles` and four others:
-#: "amplitudes" (of force), "moved" (displacement amplitudes, nan if not proved), "scales" (W0 of
-#: `Cycle.loss_normalised`) and "smooth" (losses of smooth spheres / W0).
-NORMAL: dict[str, Callable[[Found], Array]] = {
-    "contact": lambda found: (found["status"] == "contact").sum(axis=1),
-    "open": lambda found: (found["status"] == "open").sum(axis=1),
-    "undecided": lambda found: (found["status"] == "undecided").sum(axis=1),
-    "approach": lambda found: found["approaches"],
-    "approach_error": lambda found: found["approach_errors"],
-    "load": lambda found: found["loads"],
-    "area": lambda found: found["areas"],
-    "largest_load": lambda found: found["asperity_loads"].max(axis=1),
-    "certificate.load_error": lambda found: found["asperity_load_errors"].max(axis=1),
-}
-CYCLE: dict[str, Callable[[Found], Array]] = {
-    "sliding": lambda found: (found["status"] == "sliding").sum(axis=1),
-    "partial": lambda found: (found["status"] == "partial").sum(axis=1),
-    "undecided": NORMAL["undecided"],
-    "loss": lambda found: found["losses"],
-    "loss_error": lambda found: found["loss_errors"],
-    "force_amplitude": lambda found: found["amplitudes"],
-    "displacement_amplitude": lambda found: found["displacement_amplitudes"],
-    "displacement_error": lambda found: found["displacement_errors"],
-    "secant_stiffness": lambda found: found["amplitudes"] / found["moved"],
-    "loss_factor": lambda found: found["losses"] / (np.pi * found["amplitudes"] * found["moved"]),
-    "loss_normalised": lambda found: found["losses"] / found["scales"],
-    "smooth_normalised": lambda found: found["smooth"],
-    "loss_over_smooth": lambda found: found["losses"] / found["scales"] / found["smooth"],
-}
+#: Numbers of summaries that `_known` computes for many scenes together.
+NORMAL = ("contact", "open", "undecided", "approach", "approach_error", "load", "area",
+          "largest_load", "certificate.load_error")  # fmt: skip
+CYCLE = ("sliding", "partial", "undecided", "loss", "loss_error", "force_amplitude",
+         "displacement_amplitude", "displacement_error", "secant_stiffness", "loss_factor",
+         "loss_normalised", "smooth_normalised", "loss_over_smooth")  # fmt: skip
 KNOWN = {f"normal.{name}" for name in NORMAL} | {f"cycle.{name}" for name in CYCLE}
 
 
@@ -208,23 +183,33 @@ def _known(
     """The numbers of those rows in which everything is proved, by the number of the row."""
     contacts = rows.contacts()
     discs = map(discs_of, scenes, contacts["asperity_loads"])
-    contacts["areas"] = np.array([*map(total_area, discs)])
+    contacts |= {
+        "area": np.array([*map(total_area, discs)]),
+        "largest_load": contacts["asperity_loads"].max(axis=1),
+        "certificate.load_error": contacts["asperity_load_errors"].max(axis=1),
+    }
     good = ~(contacts["status"] == "undecided").any(axis=1)
-    values = {(f"normal.{name}", ""): number(contacts) for name, number in NORMAL.items()}
+    values = _in_summary("normal", "", NORMAL, contacts)
     if cycle is not None:
         friction = np.array([scene.friction for scene in scenes], dtype=np.float64)
         limits = friction * contacts["loads"]
-        smooth = map(smooth_reference, scenes, contacts["loads"].tolist())
-        scales = np.array([np.nan if each is None else each.energy_scale for each in smooth])
+        spheres = map(smooth_reference, scenes, contacts["loads"].tolist())
+        scales = np.array([np.nan if each is None else each.energy_scale for each in spheres])
         for high, low in zip(cycle.maximum_fraction, cycle.lowest, strict=True):
-            proved, fields = rows.cycles(high * limits, low * limits, friction)
+            proved, cycles = rows.cycles(high * limits, low * limits, friction)
             good &= proved
-            half = (high - low) / 2.0
-            moved = np.where(proved, fields["displacement_amplitudes"], np.nan)  # never 0
-            fields |= {"amplitudes": half * limits, "scales": scales, "moved": moved}
-            fields["smooth"] = np.where(np.isnan(scales), np.nan, mindlin.loss(half))
-            label = row_label((low, high))
-            values |= {(f"cycle.{name}", label): number(fields) for name, number in CYCLE.items()}
+            amplitude, loss = (high - low) / 2.0 * limits, cycles["losses"]
+            moved = np.where(proved, cycles["displacement_amplitudes"], np.nan)  # never 0
+            smooth = np.where(np.isnan(scales), np.nan, mindlin.loss((high - low) / 2.0))
+            cycles |= {
+                "force_amplitude": amplitude,
+                "secant_stiffness": amplitude / moved,
+                "loss_factor": loss / (np.pi * amplitude * moved),
+                "loss_normalised": loss / scales,
+                "smooth_normalised": smooth,
+                "loss_over_smooth": loss / scales / smooth,
+            }
+            values |= _in_summary("cycle", row_label((low, high)), CYCLE, cycles)
     found = {}
     for k in np.flatnonzero(good).tolist():
         numbers = {name: float(each[k]) for name, each in values.items()}
@@ -232,3 +217,14 @@ def _known(
         warned = "; ".join(cautions_about(scenes[k], *pressed))
         found[k] = Measured(numbers, "", warned)
     return found
+
+
+def _in_summary(
+    stage: str, row: str, names: Sequence[str], found: Mapping[str, Array]
+) -> dict[tuple[str, str], Array]:
+    """The numbers with these names, from arrays by their names in the singular or the plural."""
+    known = {singular(name): values for name, values in found.items()}
+    counts = {name: (known["status"] == name).sum(axis=1) for name in names if name in STATUSES}
+    return {
+        (f"{stage}.{name}", row): each for name, each in (known | counts).items() if name in names
+    }

@@ -55,22 +55,19 @@ def describe_quantiles(found: Columns) -> list[str]:
     return lines
 
 
-def failures(table: SweepTable) -> list[str]:
-    """The messages of the first `MOST_NAMED` scenes that failed."""
-    return list(islice(_messages(table, "failed"), MOST_NAMED))
-
-
-def cautions(table: SweepTable) -> list[str]:
-    """Warnings about stages with loads of their own, and about messages of certified scenes."""
-    own = [
-        f"[{name}] has its own loads, which do not vary with the load of [normal]: sweep them, or "
-        f"their factor {name}.reference, together with that load in [sweep.together]"
-        for name in table.manifest.get("own_loads", [])  # manifests of earlier versions lack it
-    ]
+def cautions(table: SweepTable) -> Iterator[str]:
+    """Warnings: the messages of the first `MOST_NAMED` scenes that failed, stages with loads of
+    their own, and messages of certified scenes."""
+    yield from islice(_messages(table, "failed"), MOST_NAMED)
+    for name in table.manifest.get("own_loads", []):  # manifests of earlier versions lack it
+        yield (
+            f"[{name}] has its own loads, which do not vary with the load of [normal]: sweep them, "
+            f"or their factor {name}.reference, together with that load in [sweep.together]"
+        )
     said = _messages(table, "certified")
-    first, count = next(said, ""), 1 + sum(1 for _ in said)
-    warned = f"{count:,} certified scenes of {len(table):,} have warnings, the first {first}"
-    return [*own, warned] if first else own
+    if first := next(said, ""):
+        count = 1 + sum(1 for _ in said)
+        yield f"{count:,} certified scenes of {len(table):,} have warnings, the first {first}"
 
 
 def _messages(table: SweepTable, status: str) -> Iterator[str]:

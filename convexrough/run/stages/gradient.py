@@ -130,8 +130,7 @@ class GradientResult(Result):
 
     def doubts(self) -> Iterator[str]:
         if not self.found:
-            why = self.none_because
-            yield f"no gradient of the {self.stage.of} exists for this scene: {why}"
+            yield f"no gradient of the {self.stage.of} exists for this scene: {self.none_because}"
         for each in self.found:
             if not np.isfinite([each.value_error, each.height_errors.max()]).all():
                 yield f"not proved: the gradient of the {self.stage.of}, whose errors have no bound"

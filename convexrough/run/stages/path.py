@@ -13,7 +13,7 @@ from convexrough.contact import Contact
 from convexrough.errors import blamed_on
 from convexrough.friction.fretting import fretting, fretting_columns
 from convexrough.friction.path import load_path
-from convexrough.friction.phases import PhaseLosses, elliptic_path, phase_losses
+from convexrough.friction.phases import elliptic_path, phase_losses
 from convexrough.friction.steady import steady
 from convexrough.melan.shakedown import Theory, shakedown
 from convexrough.record import rows_of
@@ -158,8 +158,7 @@ class SteadyStage(_Points):
                 shape = self.ellipse.model_dump(exclude={"phase", "chords"})
                 how = {name: self.reference * size for name, size in shape.items()}
                 how |= {"chords": self.ellipse.chords, "influence": influence}
-                losses = phase_losses(scene, phases=self.phases, factors=self.factors, **how)
-                found.append(losses)
+                found.append(phase_losses(scene, phases=self.phases, factors=self.factors, **how))
             return SteadyResult(self, contact, tuple(found))
 
 
@@ -172,29 +171,29 @@ class SteadyResult(Result):
 
     def summary(self) -> Summary:
         said = self.known[0] | numbers(self.found[0], ("order", "presses"))
-        for losses, columns in self.by_phase:
-            lists = {name: it.tolist() for name, it in columns.items()}
-            said |= {"phase_losses": lists | {"order": losses.order}}
+        for name, columns in self.by_phase.items():
+            lists = {key: it.tolist() for key, it in columns.items()}
+            said[name] = lists | {"order": self.found[1].order}
         return said
 
     @property
-    def by_phase(self) -> list[tuple[PhaseLosses, Columns]]:
-        """The losses at other phases, if requested, and their table."""
+    def by_phase(self) -> dict[str, Columns]:
+        """The table of losses at other phases, by its name, if it is requested."""
         names = ("phases", "factors", "losses", "loss_errors", "smooth", "levels", "sliding")
-        return [(losses, losses.columns(*names)) for losses in self.found[1:]]
+        tables = [losses.columns(*names) for losses in self.found[1:]]
+        return {"phase_losses": tables[0]} if tables else {}
 
     def tables(self) -> dict[str, Columns]:
         columns = self.at_asperities(self.found[0].columns("slips", "stick_radii", "status"))
         worn = fretting_columns([fretting(self.found[0])])
-        more = [("phase_losses", columns) for _, columns in self.by_phase]
-        return {"steady": columns, "steady_fretting": worn, **dict(more)}
+        return {"steady": columns, "steady_fretting": worn, **self.by_phase}
 
     def lines(self) -> list[str]:
         said = [*super().lines(), *self.stage.chords()]
-        for _, columns in self.by_phase:
-            printed = heads("phase, factor, loss, smooth: smooth sphere")
-            rows, title = rows_of(columns), "loss against phase"
-            said += ["", *self.printed_table("phase_losses", rows, printed, title)]
+        printed = heads("phase, factor, loss, smooth: smooth sphere")
+        for name, columns in self.by_phase.items():
+            table = self.printed_table(name, rows_of(columns), printed, "loss against phase")
+            said += ["", *table]
         return said
 
     def figures(self) -> Mapping[str, Any]:
