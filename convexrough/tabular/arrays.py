@@ -7,14 +7,13 @@ import re
 import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.errors import ConvexroughError, FileError
+from convexrough.errors import ConvexroughError, ExtraError, FileError, needed
 
 Columns = dict[str, list[Any]]
 
@@ -33,6 +32,8 @@ def reading(path: Path) -> Iterator[None]:
     """A context manager: turn errors of the body, in which a file is read, into FileErrors."""
     try:
         yield
+    except ExtraError as error:
+        raise FileError(f"{path}: {error}") from error
     except ConvexroughError:
         raise
     except UnicodeDecodeError as error:
@@ -56,15 +57,6 @@ def foreign() -> Iterator[None]:
         raise
     except Exception as error:
         raise ValueError(str(error) or type(error).__name__) from error
-
-
-def needed(path: Path, package: str) -> Any:
-    """The imported `package`, which reads the file. Raises FileError if it is not installed."""
-    try:
-        return import_module(package)
-    except ImportError as error:
-        name = package.partition(".")[0]
-        raise FileError(f"{path}: needs {name}: pip install {name}") from error
 
 
 def named_arrays(path: Path) -> dict[str, Any]:
@@ -178,7 +170,7 @@ def _matlab(path: Path) -> dict[str, Any]:
 
 
 def _parquet(path: Path) -> dict[str, Any]:
-    needed(path, "pyarrow")
+    needed("pyarrow")
     from pyarrow import parquet
 
     with path.open("rb") as raw, foreign():
