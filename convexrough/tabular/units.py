@@ -97,9 +97,7 @@ def parsed(name: str) -> Unit | None:
     for part, sign in [(upper, 1), *((each, -1) for each in under)]:
         for factor in re.split(r"\s+|·|\*(?!\*)", part.replace("**", "^").strip()):
             symbol, power = _FACTOR.fullmatch(factor).groups()  # type: ignore[union-attr]
-            symbol = _ALSO.get(symbol, symbol)
-            if symbol not in UNITS:
-                symbol = re.sub("^u", "µ", symbol)
+            symbol = re.sub("^u", "µ", _ALSO.get(symbol, symbol))  # no symbol begins with u
             if symbol not in UNITS:
                 return None
             found *= UNITS[symbol] ** (sign * int(power or 1))
@@ -196,5 +194,4 @@ NAMELESS = UnitNames()
 def force_of(pressure: Unit, length: Unit) -> str:
     """The name of the unit pressure * length^2, such as mN for GPa and µm; "" if none is known."""
     made = pressure * length**2
-    names = [name for name, unit in UNITS.items() if unit[:3] == made[:3]]
-    return names[0] if names else ""
+    return next((name for name, unit in UNITS.items() if unit[:3] == made[:3]), "")
