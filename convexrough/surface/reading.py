@@ -137,15 +137,14 @@ def read(
             heights = filled(heights)
         elif holes is not None:  # `detrend` fills them
             heights = np.where(holes, heights[~holes][0], heights)
-        if (stated := pixel if grid.pixel is None else grid.pixel) is None:
+        sizes = [checked_pixel(each) for each in (grid.pixel, pixel) if each is not None]
+        if not sizes:
             expected = "its size, which the file does not state: pixel=, or --pixel"
             raise InputError("pixel", found="none", expected=expected)
-        size = checked_pixel(stated)
-        given = size if pixel is None else checked_pixel(pixel)
-        refuse_other(given, size, SAME, "as the file states, or none given")
+        refuse_other(sizes[-1], sizes[0], SAME, "as the file states, or none given")
         name = length.name if length else ""
         source = f"{path}, sheet {grid.sheet}" if grid.sheet else str(path)
-        surface = Surface(heights, size, name, (), holes, source, grid.comments)
+        surface = Surface(heights, sizes[0], name, (), holes, source, grid.comments)
         surface = surface if detrend is None else surface.detrend(detrend)
         slope = surface.rms_slope
         if not SLOPES[0] <= slope <= SLOPES[1]:
