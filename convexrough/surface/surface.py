@@ -312,17 +312,11 @@ class Surface(Record, Plottable):
         inside = ((maxima >= reach) & (maxima < (rows - reach, columns - reach))).all(axis=1)
         tried = maxima[prominent & inside]
         tips = fit_tips(self.heights, tried, self.pixel, fit)
+        same = ("source", "pixel", "unit", "removed", "filled", "checksum", "max_height", "moments")
         origin = Origin(
-            source=self.source,
+            **{name: getattr(self, name) for name in same},
             shape=shape,
-            pixel=self.pixel,
-            unit=self.unit,
-            removed=self.removed,
-            filled=self.filled,
             level=float(self.heights.mean()),
-            checksum=self.checksum,
-            max_height=self.max_height,
-            moments=self.moments,
             prune=prune,
             fit=int(fit),
             maxima=len(maxima),

@@ -65,11 +65,8 @@ def named_arrays(path: Path) -> dict[str, Any]:
         return own(path)
     with path.open("rb") as raw, foreign():
         loaded = np.load(raw, allow_pickle=False)
-        if isinstance(loaded, np.ndarray):
-            arrays = {"": loaded}
-        else:
-            with loaded:
-                arrays = {name: np.asarray(loaded[name]) for name in loaded.files}
+        named = {"": loaded} if isinstance(loaded, np.ndarray) else loaded
+        arrays = {name: np.asarray(values) for name, values in named.items()}
         for values in arrays.values():
             if values.dtype.kind == "U":  # numpy accepts invalid characters
                 np.char.decode(np.char.encode(values, "utf-8"), "utf-8")
@@ -131,13 +128,12 @@ def _of_one_shape(path: Path, arrays: dict[str, NDArray[Any]], known: Sequence[s
     """All vectors; or all arrays of one two-dimensional shape, if all `known` arrays have it."""
     shapes = {name: each.shape for name, each in arrays.items() if name.lower() in known}
     axes = {each.size: name for name, each in arrays.items() if name.lower() in ("x", "y")}
-    wide = [each.shape for name, each in arrays.items() if name.lower() in known and each.ndim > 1]
+    wide = [shape for shape in shapes.values() if len(shape) > 1]
     if wide and len(axes) == 2 == len(wide[0]) and axes.keys() == {*wide[0]}:  # lengths show order
         names = [axes[size] for size in wide[0]]
         mesh = np.meshgrid(*(arrays[name] for name in names), indexing="ij")
         arrays = arrays | dict(zip(names, mesh, strict=True))
-    meshed = {name: each.shape for name, each in arrays.items() if name.lower() in known}
-    if wide and (len(meshed) == 1 or {*meshed.values()} != {wide[0]}):
+    if wide and (len(shapes) == 1 or {arrays[name].shape for name in shapes} != {wide[0]}):
         found = ", ".join(f"{name} of {' x '.join(map(str, it))}" for name, it in shapes.items())
         expected = "vectors, or matrices x, y (as of meshgrid) and values of one shape"
         expected += ": vectors x, y do not show what the rows are" * (len({*wide[0]}) == 1)
