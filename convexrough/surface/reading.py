@@ -267,9 +267,8 @@ def _not_heights(place: str, line: Sequence[Any] | Array) -> InputError:
 def _even(line: Array) -> bool:
     """True for more than four numbers at equal distances, up to rounding to six digits."""
     steps, size = np.diff(line), float(np.abs(line).max())
-    return bool(
-        len(steps) > 3 and steps[0] != 0 and (np.abs(steps - steps[0]) <= 1e-5 * size).all()
-    )
+    equal = np.abs(steps - steps[:1]) <= 1e-5 * size
+    return bool(len(steps) > 3 and steps[0] != 0 and equal.all())
 
 
 def _list(path: Path, cells: TextTable, width: int) -> HeightGrid:

@@ -269,7 +269,8 @@ def _describe_curve(curve: Provability, unit: str, force: str) -> list[str]:
 def _describe_crowded(contact: Contact) -> Iterator[str]:
     pairs, values = crowded(contact)
     if len(pairs):
-        yield f"{'overlapping':<18}pairs: {len(pairs):,}, by row of summits.csv from 0:"
+        count = f"pairs: {len(pairs):,}, by row of summits.csv from 0:"
+        yield from labelled([("overlapping", count)])
         x, y = contact.scene.asperities.positions.T
         table: list[list[Any]] = [["summits", "", "crowding", "x", "y"]]
         for (i, j), value in list(zip(pairs, values, strict=True))[:MOST_LISTED]:
@@ -279,9 +280,9 @@ def _describe_crowded(contact: Contact) -> Iterator[str]:
             yield f"    and {more:,} more; --json prints all"
     strained = np.flatnonzero(model_errors(contact) > TOO_FAR)
     if len(strained):
-        named = ", ".join(map(str, strained[:MOST_LISTED]))
-        rest = f" and {others:,} more" if (others := len(strained) - MOST_LISTED) > 0 else ""
-        yield f"{'model error':<18}above {TOO_FAR:.0%} at summits {named}{rest}"
+        said = f"above {TOO_FAR:.0%} at summits {', '.join(map(str, strained[:MOST_LISTED]))}"
+        said += f" and {others:,} more" if (others := len(strained) - MOST_LISTED) > 0 else ""
+        yield from labelled([("model error", said)])
 
 
 def _near_holes(scanned: Scanned) -> Iterator[str]:

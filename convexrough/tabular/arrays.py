@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import re
 import zlib
 from collections.abc import Iterator, Sequence
@@ -43,7 +42,7 @@ def reading(path: Path) -> Iterator[None]:
         raise FileError(f"{path}: not text: {error}") from error
     except OSError as error:
         raise FileError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except (ValueError, csv.Error, EOFError, zlib.error) as error:  # also those of `foreign`
+    except (ValueError, EOFError, zlib.error) as error:  # also those of `foreign`
         raise FileError(f"{path}: not an {path.suffix} file: {error}") from error
 
 

@@ -125,17 +125,17 @@ def _apart(name: str) -> tuple[str, str]:
     return found["name"], (found["unit"] or found["per"] or found["tight"] or "").strip()
 
 
-def known_unit(what: str, name: str, kind: str = "length", where: str = "") -> Unit | None:
+def known_unit(what: str, name: str, kind: str = "length") -> Unit | None:
     """The unit `name`; None for "". Raises InputError about `what` if it is no unit of `kind`."""
     if not name.strip():
         return None
     expected, unit = f"a unit of {kind}", parsed(name)
     if unit is None:
         near = nearest(name, [each for each, unit in UNITS.items() if unit.kind == kind])
-        raise InputError(what, found=repr(name), expected=f"{expected}; {near}", where=where)
+        raise InputError(what, found=repr(name), expected=f"{expected}; {near}")
     if unit.kind != kind:
         measures = f", a unit of {unit.kind}" if unit.kind else ""
-        raise InputError(what, found=f"{name}{measures}", expected=expected, where=where)
+        raise InputError(what, found=f"{name}{measures}", expected=expected)
     return unit
 
 
