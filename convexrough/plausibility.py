@@ -172,11 +172,9 @@ def is_array(scene: Scene) -> bool:
 
 def axis_outside(scene: Scene) -> bool:
     """True for an array whose asperities do not surround the axis of the sphere."""
-    if not is_array(scene):
-        return False
     low, high = scene.asperities.layout.corners
     outside = (low < high) & ((low >= 0) | (high <= 0))
-    return any(bool(outside[axes].any()) for _, axes in scene.curved)
+    return is_array(scene) and any(bool(outside[axes].any()) for _, axes in scene.curved)
 
 
 def rim_touching(scene: Scene, touching: NDArray[np.bool_], approach: float) -> float:

@@ -183,7 +183,7 @@ def describe_surface(scanned: Scanned) -> list[str]:
         force = scanned.contact.scene.units.force if scanned.contact is not None else ""
         described += ["", *_describe_curve(scanned.curve, surface.unit, force)]
     if scanned.contact is not None:
-        described += [*_describe_crowded(scanned.contact)]
+        described += _describe_crowded(scanned.contact)
     if scanned.whole is not None:
         table = [["at one approach", "asperities", "whole map", "difference"]]
         table += [[*each, f"{each[1] / each[2] - 1:+.1%}"] for each in scanned.whole.compared()]
