@@ -106,7 +106,8 @@ class Placing:
         most = loaded & ~far if far.sum() <= FEW_FAR * loaded.sum() else loaded
         moved = ""
         if loaded.any() and not self._fits(self.points[most]):
-            moved = self._misread(loaded, self._about_shifted(loaded, values))
+            points, weights = self.points[loaded], np.abs(values[loaded])
+            moved = self._misread(points, self._about_shifted(points, weights))
         if moved:
             self.mistakes.append(f"positions: {moved}")
             return owners
@@ -334,8 +335,7 @@ class Placing:
         self.how = f"matched by position (largest distance {most:.2g})"
         doubtful = far.any() if len(points) == len(self.scene) else far.mean() > 0.5
         if doubtful or not alone:
-            every = np.ones(len(points), dtype=np.bool_)
-            if moved := self._misread(every, self._shifted(points)):
+            if moved := self._misread(points, self._shifted(points)):
                 self.mistakes.append(f"positions: {moved}")
                 return owners
             placed = len(np.unique(owners[~far]))
@@ -355,9 +355,9 @@ class Placing:
         self._refuse_repeated(owners, ~far, "each asperity once")
         return owners
 
-    def _misread(self, rows: NDArray[np.bool_], shifted: Iterator[Read]) -> str:
-        """A message on columns, signs, units or a shift with which the rows fit; "" if none do."""
-        orders, named = self._orders(), chain(self._readings(rows), shifted)
+    def _misread(self, points: Array, shifted: Iterator[Read]) -> str:
+        """A message on columns, signs, units or a shift with which points fit; "" if none do."""
+        orders, named = self._orders(), chain(self._readings(points), shifted)
         ways = chain(named, orders) if self._may_be_loads(self.column) else chain(orders, named)
         return next((said for said, points in ways if self._fits(points)), "")
 
@@ -383,9 +383,9 @@ class Placing:
                 said = f"{start} the columns in another order: {_options('column', named)}"
                 yield said, np.column_stack([held[name] for name in order[:2]])
 
-    def _readings(self, rows: NDArray[np.bool_]) -> Iterator[Read]:
+    def _readings(self, points: Array) -> Iterator[Read]:
         """Other axes, turns, signs and units of x and y."""
-        called, points = self._called, self.points[rows]
+        called = self._called
         exchanged = {"x": called["y"], "y": called["x"]}
         exchange = _options("column", exchanged if self._headed else called | exchanged)
         turns = [it for it in (30, -30, 45, -45, 90, -90) if self._fits(turned(points, -it))]
@@ -415,10 +415,9 @@ class Placing:
             if self._fits(points[:20] + shift):
                 yield self._moved(points, shift)
 
-    def _about_shifted(self, rows: NDArray[np.bool_], values: Array) -> Iterator[Read]:
+    def _about_shifted(self, points: Array, weights: Array) -> Iterator[Read]:
         """The shift from the axis that is likely for loaded nodes."""
-        points, weights, places = self.points[rows], np.abs(values[rows]), self.scene.contact_points
-        shift = np.average(points, axis=0, weights=weights)
+        places, shift = self.scene.contact_points, np.average(points, axis=0, weights=weights)
         for _ in range(REFINEMENTS):  # the weighted mean vector from the nearest asperities
             near = places[self._nearest(points - shift)[1]]
             shift = np.average(points - near, axis=0, weights=weights)
