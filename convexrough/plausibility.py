@@ -67,19 +67,6 @@ def limits(
     }
 
 
-def wrong_loads(contact: Contact) -> Iterator[str]:
-    """A warning if the loads may be far from the exact solution, whose statuses are proved."""
-    proof, largest = contact.certificate, float(contact.loads.max())
-    loaded = int(((contact.loads > 0) & (proof.status == "open")).sum())
-    far = proof.load_error > INACCURATE * largest and "contact" in proof.status
-    if largest and (loaded or far):  # `cautions` warns of loads that are all 0
-        off = f"{bound(100 * proof.load_error / largest, 2)} % of the largest load"
-        yield (
-            f"the loads err by up to {off}; asperities with a load that are proved open: "
-            f"{loaded}; check the solver"
-        )
-
-
 def doubts_of(contact: Contact) -> Iterator[str]:
     """The reason why not every status is proved, if that is so."""
     if contact.certificate.scope == "none":
@@ -89,8 +76,17 @@ def doubts_of(contact: Contact) -> Iterator[str]:
 
 
 def cautions_of(contact: Contact, known: Mapping[str, Any] | None = None) -> Iterator[str]:
-    """The warnings of `wrong_loads` and `cautions` for a contact, whose limits may be `known`."""
-    yield from wrong_loads(contact)
+    """A warning if the loads may be far from the exact solution, whose statuses are proved; and
+    those of `cautions`. The limits of the contact may be `known`."""
+    proof, largest = contact.certificate, float(contact.loads.max())
+    loaded = int(((contact.loads > 0) & (proof.status == "open")).sum())
+    far = proof.load_error > INACCURATE * largest and "contact" in proof.status
+    if largest and (loaded or far):  # `cautions` warns of loads that are all 0
+        off = f"{bound(100 * proof.load_error / largest, 2)} % of the largest load"
+        yield (
+            f"the loads err by up to {off}; asperities with a load that are proved open: "
+            f"{loaded}; check the solver"
+        )
     yield from cautions(known or limits_of(contact), contact.scene, contact.approach)
 
 
@@ -176,11 +172,9 @@ def is_array(scene: Scene) -> bool:
 
 def axis_outside(scene: Scene) -> bool:
     """True for an array whose asperities do not surround the axis of the sphere."""
-    if not is_array(scene):
-        return False
     low, high = scene.asperities.layout.corners
     outside = (low < high) & ((low >= 0) | (high <= 0))
-    return any(bool(outside[axes].any()) for _, axes in scene.curved)
+    return is_array(scene) and any(bool(outside[axes].any()) for _, axes in scene.curved)
 
 
 def rim_touching(scene: Scene, touching: NDArray[np.bool_], approach: float) -> float:

@@ -126,14 +126,11 @@ class Whole(Table):
     def compared(self) -> list[tuple[str, float, float]]:
         """For each quantity its name, its value for the asperities, and for the whole map."""
         model = self.contact
-        area = float((np.pi * model.contact_radii**2).sum())
-        touching = int(np.count_nonzero(model.loads))
-        heaviest = float(model.loads.max()), float(self.loads.max())
         return [
             ("load", model.load, self.load),
-            ("area of contact", area, self.area),
-            ("contacts", touching, self.pieces),
-            ("largest load", *heaviest),
+            ("area of contact", float((np.pi * model.contact_radii**2).sum()), self.area),
+            ("contacts", int(np.count_nonzero(model.loads)), self.pieces),
+            ("largest load", float(model.loads.max()), float(self.loads.max())),
         ]
 
     def _rows(self) -> Iterator[tuple[str, str]]:

@@ -74,11 +74,10 @@ def _passes(ranks: NDArray[np.intp], owners: Indices, count: int) -> Indices:
     # crossing down.
     crossings = [_crossings(ranks, owners, step) for step in PAIRS]
     first, second, rank = (np.concatenate(each) for each in zip(*crossings, strict=True))
-    highest_first = np.lexsort((-rank, second, first))
-    first, second, rank = first[highest_first], second[highest_first], rank[highest_first]
-    new = np.append(True, (np.diff(first) != 0) | (np.diff(second) != 0))[: len(first)]
-    weights = (ranks.size - rank[new]).astype(np.float64)  # at least 1, because 0 means no edge
-    graph = coo_array((weights, (first[new], second[new])), shape=(count, count))
+    highest_first = np.argsort(-rank)
+    pairs, new = np.unique((first * count + second)[highest_first], return_index=True)
+    weights = (ranks.size - rank[highest_first[new]]).astype(np.float64)  # from 1: 0 is no edge
+    graph = coo_array((weights, np.divmod(pairs, count)), shape=(count, count))
     tree = minimum_spanning_tree(graph.tocsr()).tocoo()
 
     passes = np.zeros(count, dtype=np.intp)

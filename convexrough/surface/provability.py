@@ -140,9 +140,8 @@ def crowded(contact: Contact, above: float = OVERLAP) -> tuple[Indices, Array]:
     checks.instance("contact", contact, Contact)
     touching = np.flatnonzero(contact.contact_radii)
     points, radii = contact.scene.contact_points[touching], contact.contact_radii[touching]
-    if len(touching) == 0:
-        return np.zeros((0, 2), dtype=np.intp), np.zeros(0)
-    pairs = cKDTree(points).query_pairs(2 * radii.max() / above, output_type="ndarray")
+    reach = 2 * radii.max(initial=0.0) / above
+    pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
     i, j = pairs.T
     values = (radii[i] + radii[j]) / np.hypot(*(points[i] - points[j]).T)
     worst = np.argsort(-values, kind="stable")

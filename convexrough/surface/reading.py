@@ -19,15 +19,9 @@ from numpy.typing import NDArray
 
 from convexrough.arrays import Array
 from convexrough.errors import InputError, blamed_on
+from convexrough.surface import map_arrays
 from convexrough.surface.detrend import Trend
-from convexrough.surface.map_arrays import (
-    SCALES,
-    HeightGrid,
-    arrays_map,
-    instrument_map,
-    on_grid,
-    refuse_other,
-)  # fmt: skip
+from convexrough.surface.map_arrays import HeightGrid
 from convexrough.surface.pixels import filled
 from convexrough.surface.surface import Surface, checked_pixel
 from convexrough.tabular.arrays import reading
@@ -116,9 +110,10 @@ def read(
         with reading(path):
             if kind in TEXT:
                 grid = text_map(path)
+            elif kind in (".npy", ".npz", ".mat"):
+                grid = map_arrays.arrays_map(path)
             else:
-                is_known = kind in (".npy", ".npz", ".mat")
-                grid = arrays_map(path) if is_known else instrument_map(path, pixel)
+                grid = map_arrays.instrument_map(path, pixel)
         unclear = next(filter(states_scale, grid.comments), "")
         if unclear and not ((pixel or grid.pixel) and (height_unit or grid.height_unit)):
             expected = '"Width: 50 µm", "Height: 50 µm" and "Value units: nm" above a matrix, '
@@ -137,15 +132,14 @@ def read(
             heights = filled(heights)
         elif holes is not None:  # `detrend` fills them
             heights = np.where(holes, heights[~holes][0], heights)
-        if (stated := pixel if grid.pixel is None else grid.pixel) is None:
+        sizes = [checked_pixel(each) for each in (grid.pixel, pixel) if each is not None]
+        if not sizes:
             expected = "its size, which the file does not state: pixel=, or --pixel"
             raise InputError("pixel", found="none", expected=expected)
-        size = checked_pixel(stated)
-        given = size if pixel is None else checked_pixel(pixel)
-        refuse_other(given, size, SAME, "as the file states, or none given")
+        map_arrays.refuse_other(sizes[-1], sizes[0], SAME, "as the file states, or none given")
         name = length.name if length else ""
         source = f"{path}, sheet {grid.sheet}" if grid.sheet else str(path)
-        surface = Surface(heights, size, name, (), holes, source, grid.comments)
+        surface = Surface(heights, sizes[0], name, (), holes, source, grid.comments)
         surface = surface if detrend is None else surface.detrend(detrend)
         slope = surface.rms_slope
         if not SLOPES[0] <= slope <= SLOPES[1]:
@@ -234,9 +228,8 @@ def _matrix(path: Path, table: TextTable, width: int) -> HeightGrid:
             if (np.abs(off) < 0.01 * spread).all():
                 found = f"the means of the {'columns' if place == 'row' else 'rows'}"
                 raise InputError(f"last {place}", found=found, expected="heights alone")
-    said = {}
-    for match in filter(None, map(_SAID.fullmatch, table.comments)):
-        said[match[1].lower().rstrip("s")] = match[2]
+    stated = filter(None, map(_SAID.fullmatch, table.comments))
+    said = {match[1].lower().rstrip("s"): match[2] for match in stated}
     if pairs := [line.groups() for line in map(_ESRI.match, table.comments) if line]:
         esri = {name.lower(): float(value.replace(",", ".")) for name, value in pairs}
         shape, once = (esri.get("nrows"), esri.get("ncols")), len(esri) == len(pairs)
@@ -274,9 +267,8 @@ def _not_heights(place: str, line: Sequence[Any] | Array) -> InputError:
 def _even(line: Array) -> bool:
     """True for more than four numbers at equal distances, up to rounding to six digits."""
     steps, size = np.diff(line), float(np.abs(line).max())
-    return bool(
-        len(steps) > 3 and steps[0] != 0 and (np.abs(steps - steps[0]) <= 1e-5 * size).all()
-    )
+    equal = np.abs(steps - steps[:1]) <= 1e-5 * size
+    return bool(len(steps) > 3 and steps[0] != 0 and equal.all())
 
 
 def _list(path: Path, cells: TextTable, width: int) -> HeightGrid:
@@ -301,7 +293,7 @@ def _list(path: Path, cells: TextTable, width: int) -> HeightGrid:
     if units[0] != units[1]:
         found = f"{units[0] or 'none'} and {units[1] or 'none'}"
         raise InputError("units", found=found, expected="one along x and y")
-    return HeightGrid(*on_grid(z, x, y), units[0], units[2])
+    return HeightGrid(*map_arrays.on_grid(z, x, y), units[0], units[2])
 
 
 def _is_label(name: str, cells: NDArray[Any]) -> bool:
@@ -309,4 +301,4 @@ def _is_label(name: str, cells: NDArray[Any]) -> bool:
     count = len(np.unique(cells))
     if is_index(name):
         return count == len(cells)
-    return count == 1 and cells.dtype.kind == "U" and not SCALES.search(name)
+    return count == 1 and cells.dtype.kind == "U" and not map_arrays.SCALES.search(name)

@@ -92,12 +92,8 @@ def surface_summary(scanned: Scanned) -> dict[str, Any]:
         "schema": 1,
         "version": __version__,
         "surface": {
-            "source": surface.source,
-            "comments": list(surface.comments),
-            "shape": list(origin.shape),
-            "pixel": list(surface.pixel),
-            "unit": surface.unit,
-            "level": origin.level,
+            **_named(surface, "source", "comments"),
+            **_named(origin, "shape", "pixel", "unit", "level"),
             "removed": [asdict(it) | _named(it, "curvature", "radius") for it in surface.removed],
             **_named(surface, "filled", "step", "max_height", "rms_height", "rms_slope"),
         },
@@ -187,7 +183,7 @@ def describe_surface(scanned: Scanned) -> list[str]:
         force = scanned.contact.scene.units.force if scanned.contact is not None else ""
         described += ["", *_describe_curve(scanned.curve, surface.unit, force)]
     if scanned.contact is not None:
-        described += [*_describe_crowded(scanned.contact)]
+        described += _describe_crowded(scanned.contact)
     if scanned.whole is not None:
         table = [["at one approach", "asperities", "whole map", "difference"]]
         table += [[*each, f"{each[1] / each[2] - 1:+.1%}"] for each in scanned.whole.compared()]
@@ -273,7 +269,8 @@ def _describe_curve(curve: Provability, unit: str, force: str) -> list[str]:
 def _describe_crowded(contact: Contact) -> Iterator[str]:
     pairs, values = crowded(contact)
     if len(pairs):
-        yield f"{'overlapping':<18}pairs: {len(pairs):,}, by row of summits.csv from 0:"
+        count = f"pairs: {len(pairs):,}, by row of summits.csv from 0:"
+        yield from labelled([("overlapping", count)])
         x, y = contact.scene.asperities.positions.T
         table: list[list[Any]] = [["summits", "", "crowding", "x", "y"]]
         for (i, j), value in list(zip(pairs, values, strict=True))[:MOST_LISTED]:
@@ -283,9 +280,9 @@ def _describe_crowded(contact: Contact) -> Iterator[str]:
             yield f"    and {more:,} more; --json prints all"
     strained = np.flatnonzero(model_errors(contact) > TOO_FAR)
     if len(strained):
-        named = ", ".join(map(str, strained[:MOST_LISTED]))
-        rest = f" and {others:,} more" if (others := len(strained) - MOST_LISTED) > 0 else ""
-        yield f"{'model error':<18}above {TOO_FAR:.0%} at summits {named}{rest}"
+        said = f"above {TOO_FAR:.0%} at summits {', '.join(map(str, strained[:MOST_LISTED]))}"
+        said += f" and {others:,} more" if (others := len(strained) - MOST_LISTED) > 0 else ""
+        yield from labelled([("model error", said)])
 
 
 def _near_holes(scanned: Scanned) -> Iterator[str]:

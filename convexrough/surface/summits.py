@@ -124,9 +124,8 @@ class Summits(Table, Asperities, Plottable):
         **own: NDArray[Any],
     ) -> None:
         super().__init__(positions, tip_radii, heights)
-        for name, values in own.items():
-            object.__setattr__(self, name, frozen(np.array(values)))
-        object.__setattr__(self, "origin", origin)
+        columns = {name: frozen(np.array(values)) for name, values in own.items()}
+        self.__dict__.update(columns, origin=origin)
 
     @property
     def x(self) -> Array:
@@ -185,9 +184,9 @@ class Summits(Table, Asperities, Plottable):
         if not keep.any():
             found = f"none of {origin.maxima:,} maxima is left"
             raise InputError("summits", found=found, expected="at least one: prune less")
-        columns: dict[str, Any] = self.__getstate__() | {"origin": None}
-        chosen = {name: values[keep] for name, values in columns.items() if values is not None}
-        return Summits(**chosen, origin=origin)
+        columns = self.__getstate__()
+        del columns["origin"]
+        return Summits(**{name: values[keep] for name, values in columns.items()}, origin=origin)
 
 
 class Tips(NamedTuple):

@@ -103,25 +103,23 @@ class Surface(Record, Plottable):
         if not isinstance(unit, str):
             raise InputError("unit", found=repr(unit)[:60], expected='a name, such as "µm", or ""')
         named = known_unit("unit", unit)
-        measured = known = grid
         if filled_pixels is not None:
             filled_pixels = frozen(np.array(filled_pixels))
             if filled_pixels.dtype.kind != "b" or filled_pixels.shape != grid.shape:
                 found = f"an array of {filled_pixels.dtype}, of shape {filled_pixels.shape}"
                 expected = f"True or False for each height, of shape {grid.shape}"
                 raise InputError("filled_pixels", found=found, expected=expected)
-            measured, known = np.where(filled_pixels, np.nan, grid), grid[~filled_pixels]
+        self.__dict__.update(heights=grid, filled_pixels=filled_pixels)
+        known = grid if filled_pixels is None else grid[~filled_pixels]
         self.__dict__.update(
-            heights=grid,
             pixel=size,
             unit=named.name if named else "",
             removed=removed,
-            filled_pixels=filled_pixels,
             source=source,
             comments=comments,
             clipped=pixels.clipped(known) if clipped is None else clipped,
             repeated=pixels.repeated(known) if repeated is None else repeated,
-            copied=pixels.copied(measured) if copied is None else copied,
+            copied=pixels.copied(self._measured) if copied is None else copied,
             step=pixels.step(known) if step is None else step,
         )
 
@@ -314,17 +312,11 @@ class Surface(Record, Plottable):
         inside = ((maxima >= reach) & (maxima < (rows - reach, columns - reach))).all(axis=1)
         tried = maxima[prominent & inside]
         tips = fit_tips(self.heights, tried, self.pixel, fit)
+        same = ("source", "pixel", "unit", "removed", "filled", "checksum", "max_height", "moments")
         origin = Origin(
-            source=self.source,
+            **{name: getattr(self, name) for name in same},
             shape=shape,
-            pixel=self.pixel,
-            unit=self.unit,
-            removed=self.removed,
-            filled=self.filled,
             level=float(self.heights.mean()),
-            checksum=self.checksum,
-            max_height=self.max_height,
-            moments=self.moments,
             prune=prune,
             fit=int(fit),
             maxima=len(maxima),

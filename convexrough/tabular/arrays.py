@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import csv
 import re
 import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.errors import ConvexroughError, FileError
+from convexrough.errors import ConvexroughError, ExtraError, FileError, needed
 
 Columns = dict[str, list[Any]]
 
@@ -33,6 +31,8 @@ def reading(path: Path) -> Iterator[None]:
     """A context manager: turn errors of the body, in which a file is read, into FileErrors."""
     try:
         yield
+    except ExtraError as error:
+        raise FileError(f"{path}: {error}") from error
     except ConvexroughError:
         raise
     except UnicodeDecodeError as error:
@@ -42,7 +42,7 @@ def reading(path: Path) -> Iterator[None]:
         raise FileError(f"{path}: not text: {error}") from error
     except OSError as error:
         raise FileError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except (ValueError, csv.Error, EOFError, zlib.error) as error:  # also those of `foreign`
+    except (ValueError, EOFError, zlib.error) as error:  # also those of `foreign`
         raise FileError(f"{path}: not an {path.suffix} file: {error}") from error
 
 
@@ -58,26 +58,14 @@ def foreign() -> Iterator[None]:
         raise ValueError(str(error) or type(error).__name__) from error
 
 
-def needed(path: Path, package: str) -> Any:
-    """The imported `package`, which reads the file. Raises FileError if it is not installed."""
-    try:
-        return import_module(package)
-    except ImportError as error:
-        name = package.partition(".")[0]
-        raise FileError(f"{path}: needs {name}: pip install {name}") from error
-
-
 def named_arrays(path: Path) -> dict[str, Any]:
     """The arrays of a file by name; the name of an unnamed array is ""."""
     if own := {".mat": _matlab, ".parquet": _parquet}.get(path.suffix.lower()):
         return own(path)
     with path.open("rb") as raw, foreign():
         loaded = np.load(raw, allow_pickle=False)
-        if isinstance(loaded, np.ndarray):
-            arrays = {"": loaded}
-        else:
-            with loaded:
-                arrays = {name: np.asarray(loaded[name]) for name in loaded.files}
+        named = {"": loaded} if isinstance(loaded, np.ndarray) else loaded
+        arrays = {name: np.asarray(values) for name, values in named.items()}
         for values in arrays.values():
             if values.dtype.kind == "U":  # numpy accepts invalid characters
                 np.char.decode(np.char.encode(values, "utf-8"), "utf-8")
@@ -139,13 +127,12 @@ def _of_one_shape(path: Path, arrays: dict[str, NDArray[Any]], known: Sequence[s
     """All vectors; or all arrays of one two-dimensional shape, if all `known` arrays have it."""
     shapes = {name: each.shape for name, each in arrays.items() if name.lower() in known}
     axes = {each.size: name for name, each in arrays.items() if name.lower() in ("x", "y")}
-    wide = [each.shape for name, each in arrays.items() if name.lower() in known and each.ndim > 1]
+    wide = [shape for shape in shapes.values() if len(shape) > 1]
     if wide and len(axes) == 2 == len(wide[0]) and axes.keys() == {*wide[0]}:  # lengths show order
         names = [axes[size] for size in wide[0]]
         mesh = np.meshgrid(*(arrays[name] for name in names), indexing="ij")
         arrays = arrays | dict(zip(names, mesh, strict=True))
-    meshed = {name: each.shape for name, each in arrays.items() if name.lower() in known}
-    if wide and (len(meshed) == 1 or {*meshed.values()} != {wide[0]}):
+    if wide and (len(shapes) == 1 or {arrays[name].shape for name in shapes} != {wide[0]}):
         found = ", ".join(f"{name} of {' x '.join(map(str, it))}" for name, it in shapes.items())
         expected = "vectors, or matrices x, y (as of meshgrid) and values of one shape"
         expected += ": vectors x, y do not show what the rows are" * (len({*wide[0]}) == 1)
@@ -178,7 +165,7 @@ def _matlab(path: Path) -> dict[str, Any]:
 
 
 def _parquet(path: Path) -> dict[str, Any]:
-    needed(path, "pyarrow")
+    needed("pyarrow")
     from pyarrow import parquet
 
     with path.open("rb") as raw, foreign():

@@ -279,8 +279,7 @@ def _numbers(
         cell, place = cells[i], f"{source.rows[i]}, column {name}"
         try:
             if (number := style.number(cell)) is not None:
-                check(place, number)
-                continue
+                check(place, number)  # raises the error
             comma = style.number(str(cell).replace(",", ".", 1)) is not None
             expected = "a decimal point, not a comma" if comma else "a finite number"
             if PERHAPS_GROUPED.fullmatch(str(cell)):

@@ -12,6 +12,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
+from functools import partial
 from gzip import GzipFile
 from io import BufferedReader, TextIOWrapper
 from itertools import islice, zip_longest
@@ -21,8 +22,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from convexrough.arrays import Array
-from convexrough.errors import FileError, InputError
-from convexrough.tabular.arrays import foreign, needed
+from convexrough.errors import FileError, InputError, needed
+from convexrough.tabular.arrays import foreign
 from convexrough.tabular.roles import shortened
 from convexrough.tabular.units import bare, parsed, unit
 
@@ -300,10 +301,8 @@ def _lines(path: Path) -> Iterator[tuple[int, str]]:
         is_packed = packed.peek(2)[:2] == b"\x1f\x8b"
         raw: Any = BufferedReader(GzipFile(fileobj=packed)) if is_packed else packed
         encoding = _encoding(path, raw)
-        number = 0
         with TextIOWrapper(raw, encoding=encoding, errors="surrogateescape") as file:
-            while line := file.readline(LONGEST + 1):
-                number += 1
+            for number, line in enumerate(iter(partial(file.readline, LONGEST + 1), ""), 1):
                 if len(line) > LONGEST:
                     raise FileError(f"{path}: row {number}: longer than {LONGEST:,} characters")
                 if "\0" in line:
@@ -318,7 +317,7 @@ def _sheet_lines(
 ) -> tuple[str, Iterator[tuple[int, str]], list[str]]:
     """The sheet that `read_text_table` reads: its name and those of others that fit equally well,
     in quotes; its numbered rows, separated by tabs; and, for a map, the rows of other sheets."""
-    openpyxl = needed(path, "openpyxl")
+    openpyxl = needed("openpyxl")
     with path.open("rb") as raw, foreign():
         book = openpyxl.load_workbook(raw, read_only=True, data_only=True)
         pages = {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from contextlib import suppress
 
 #: Largest number of mistakes of one file, and of characters of a line, that are shown.
 MOST_SLIPS, MOST_SHOWN = 10, 60
@@ -71,11 +72,9 @@ def _corrected(line: str) -> tuple[str, str] | None:
             if "word" in parts:
                 parts["word"] = parts["word"].lower()
             mended = f"{parts['key']} = {meant.format(**parts)}"
-            try:
+            with suppress(ValueError, RecursionError):
                 tomllib.loads(mended)
-            except (ValueError, RecursionError):
-                continue
-            return mended, why
+                return mended, why
     return None
 
 

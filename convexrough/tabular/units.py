@@ -97,9 +97,7 @@ def parsed(name: str) -> Unit | None:
     for part, sign in [(upper, 1), *((each, -1) for each in under)]:
         for factor in re.split(r"\s+|·|\*(?!\*)", part.replace("**", "^").strip()):
             symbol, power = _FACTOR.fullmatch(factor).groups()  # type: ignore[union-attr]
-            symbol = _ALSO.get(symbol, symbol)
-            if symbol not in UNITS:
-                symbol = re.sub("^u", "µ", symbol)
+            symbol = re.sub("^u", "µ", _ALSO.get(symbol, symbol))  # no symbol begins with u
             if symbol not in UNITS:
                 return None
             found *= UNITS[symbol] ** (sign * int(power or 1))
@@ -127,17 +125,17 @@ def _apart(name: str) -> tuple[str, str]:
     return found["name"], (found["unit"] or found["per"] or found["tight"] or "").strip()
 
 
-def known_unit(what: str, name: str, kind: str = "length", where: str = "") -> Unit | None:
+def known_unit(what: str, name: str, kind: str = "length") -> Unit | None:
     """The unit `name`; None for "". Raises InputError about `what` if it is no unit of `kind`."""
     if not name.strip():
         return None
     expected, unit = f"a unit of {kind}", parsed(name)
     if unit is None:
         near = nearest(name, [each for each, unit in UNITS.items() if unit.kind == kind])
-        raise InputError(what, found=repr(name), expected=f"{expected}; {near}", where=where)
+        raise InputError(what, found=repr(name), expected=f"{expected}; {near}")
     if unit.kind != kind:
         measures = f", a unit of {unit.kind}" if unit.kind else ""
-        raise InputError(what, found=f"{name}{measures}", expected=expected, where=where)
+        raise InputError(what, found=f"{name}{measures}", expected=expected)
     return unit
 
 
@@ -196,5 +194,4 @@ NAMELESS = UnitNames()
 def force_of(pressure: Unit, length: Unit) -> str:
     """The name of the unit pressure * length^2, such as mN for GPa and µm; "" if none is known."""
     made = pressure * length**2
-    names = [name for name, unit in UNITS.items() if unit[:3] == made[:3]]
-    return names[0] if names else ""
+    return next((name for name, unit in UNITS.items() if unit[:3] == made[:3]), "")

@@ -49,12 +49,12 @@ CLAIMS = {
 #: pressure. A grid is refused if such lines together lack more than FEW_GAPS times as many.
 GAPS, FEW_GAPS = 0.5, 0.05
 
-#: Words that mark a column as one of shear statuses, whatever its header.
-OF_SHEAR = {"sliding", "partial", "sticking", "slip", "slipping", "stick", "stuck", "undecided"}
-
 #: The statuses accepted in a file of shear forces. For "undecided" the force decides whether the
 #: asperity is claimed to slide or to stick.
 STATUSES = ("sliding", "partial", "sticking", "open", "undecided")
+
+#: Words that mark a column as one of statuses, whatever its header.
+OF_STATUS = {*WORDS, *STATUSES, "slip", "slipping", "stick", "stuck"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -311,8 +311,7 @@ def _unread_statuses(table: ReadTable) -> Iterator[str]:
     """A message for each unread column that contains statuses, or flags that mean slip or stick."""
     for header, cells in table.others.items() if "status" not in table.columns else ():
         name, said = bare(header)[:60], {str(cell).strip().lower() for cell in cells.tolist()}
-        known = {*WORDS, *OF_SHEAR}
-        if said & known and said <= {*known, ""}:
+        if said & OF_STATUS and said <= {*OF_STATUS, ""}:
             named = f"--column status={quote(name)}"
             yield f"column {name}: found statuses, expected them in a column called status: {named}"
         elif re.fullmatch("(?i)(stick|slip|slid).*", name) and said <= FLAGS.keys():

@@ -72,16 +72,16 @@ class Placing:
     mistakes: list[str] = field(default_factory=list)  # messages about wrong rows
 
     @cached_property
-    def points(self) -> Array | None:
-        """(m, 2) [length] x and y of the rows; None if the table lacks these columns."""
-        columns = self.table.columns
-        return np.column_stack((columns["x"], columns["y"])) if "x" in columns else None
+    def points(self) -> Array:
+        """(m, 2) [length] x and y of the rows."""
+        return np.column_stack([self.table.columns[name] for name in "xy"])
 
     def owners(self, values: Array) -> Indices:
         """(m,) the index of the asperity of each row, with loads or forces `values`."""
         if self.summed:
             return self._nearest_to_each(values)
-        found, by = self._numbered_or_in_order() if self.points is None else (self._matched(), True)
+        placed = "x" in self.table.columns
+        found, by = (self._matched(), True) if placed else self._numbered_or_in_order()
         count, rows = len(self.scene), len(self.table.rows)
         if rows == count or (rows < count and (by or self.mistakes) and self.missing_open):
             return found
@@ -91,7 +91,7 @@ class Placing:
         advice = "" if by else unused(self.table)
         if rows < count and (by or self._indices()):
             advice = f"{self.part}; --missing-open claims that the others are open"
-        elif rows > count and (self.points is None or len(np.unique(self.points, axis=0)) > count):
+        elif rows > count and (not placed or len(np.unique(self.points, axis=0)) > count):
             advice += "; --nodes sums rows by asperity"
         expected = f"expected {count}, one per asperity of the scene{advice}"
         where = in_sheet(self.table.style)
@@ -100,14 +100,14 @@ class Placing:
 
     def _nearest_to_each(self, values: Array) -> Indices:
         """(m,) the asperity nearest to each node or pixel; `mistakes` names nodes that are far."""
-        assert self.points is not None
         loaded = values != 0
         distances, owners = self._nearest(self.points)
         far = loaded & (distances > REACH * self._apart[owners])
         most = loaded & ~far if far.sum() <= FEW_FAR * loaded.sum() else loaded
         moved = ""
         if loaded.any() and not self._fits(self.points[most]):
-            moved = self._misread(loaded, self._about_shifted(loaded, values))
+            points, weights = self.points[loaded], np.abs(values[loaded])
+            moved = self._misread(points, self._about_shifted(points, weights))
         if moved:
             self.mistakes.append(f"positions: {moved}")
             return owners
@@ -145,7 +145,6 @@ class Placing:
             loads = np.bincount(owners, values, minlength=len(self.scene)).clip(min=0.0)
             return discs_of(self.scene, loads)
 
-        assert self.points is not None
         nodes, nearest = np.column_stack((self.points, np.zeros(len(owners)))), owners
         for _ in range(ROUNDS):
             radii, before = discs(owners), owners
@@ -162,7 +161,7 @@ class Placing:
     def part(self) -> str:
         """A text if rows are on one side of an axis only, and asperities on both; else ""."""
         own, near = self.scene.contact_points, POSITION_TOLERANCE * self._spacing
-        points = own if self.points is None else self.points
+        points = self.points if "x" in self.table.columns else own
         ways = (("x >=", (1, 0)), ("x <=", (-1, 0)), ("y >=", (0, 1)), ("y <=", (0, -1)))
         sides = [f"{side} 0" for side, along in ways
                  if (points @ along).min() >= -near > (own @ along).min()
@@ -284,7 +283,7 @@ class Placing:
         from scipy.spatial import cKDTree  # takes 0.1 s to import
 
         tops, contact_points = self.scene.asperities.positions, self.scene.contact_points
-        if self.summed or self.points is None:
+        if self.summed or "x" not in self.table.columns:
             return cKDTree(contact_points if self.summed else tops)
         of_tops, others = cKDTree(tops), cKDTree(contact_points)
         far = [float(np.median(tree.query(self.points)[0])) for tree in (of_tops, others)]
@@ -329,7 +328,6 @@ class Placing:
 
     def _matched(self) -> Indices:
         """(m,) the asperity at each point; `mistakes` names points at none, or two at the same."""
-        assert self.points is not None
         points, allowed = self.points, self._allowed
         distances, owners = self._nearest(points)
         far, alone = distances > allowed, len(np.unique(owners)) == len(owners)
@@ -337,8 +335,7 @@ class Placing:
         self.how = f"matched by position (largest distance {most:.2g})"
         doubtful = far.any() if len(points) == len(self.scene) else far.mean() > 0.5
         if doubtful or not alone:
-            every = np.ones(len(points), dtype=np.bool_)
-            if moved := self._misread(every, self._shifted(points)):
+            if moved := self._misread(points, self._shifted(points)):
                 self.mistakes.append(f"positions: {moved}")
                 return owners
             placed = len(np.unique(owners[~far]))
@@ -358,9 +355,9 @@ class Placing:
         self._refuse_repeated(owners, ~far, "each asperity once")
         return owners
 
-    def _misread(self, rows: NDArray[np.bool_], shifted: Iterator[Read]) -> str:
-        """A message on columns, signs, units or a shift with which the rows fit; "" if none do."""
-        orders, named = self._orders(), chain(self._readings(rows), shifted)
+    def _misread(self, points: Array, shifted: Iterator[Read]) -> str:
+        """A message on columns, signs, units or a shift with which points fit; "" if none do."""
+        orders, named = self._orders(), chain(self._readings(points), shifted)
         ways = chain(named, orders) if self._may_be_loads(self.column) else chain(orders, named)
         return next((said for said, points in ways if self._fits(points)), "")
 
@@ -386,10 +383,9 @@ class Placing:
                 said = f"{start} the columns in another order: {_options('column', named)}"
                 yield said, np.column_stack([held[name] for name in order[:2]])
 
-    def _readings(self, rows: NDArray[np.bool_]) -> Iterator[Read]:
+    def _readings(self, points: Array) -> Iterator[Read]:
         """Other axes, turns, signs and units of x and y."""
-        called, held = self._called, self.table.columns
-        points = np.column_stack((held["x"], held["y"]))[rows]
+        called = self._called
         exchanged = {"x": called["y"], "y": called["x"]}
         exchange = _options("column", exchanged if self._headed else called | exchanged)
         turns = [it for it in (30, -30, 45, -45, 90, -90) if self._fits(turned(points, -it))]
@@ -419,11 +415,9 @@ class Placing:
             if self._fits(points[:20] + shift):
                 yield self._moved(points, shift)
 
-    def _about_shifted(self, rows: NDArray[np.bool_], values: Array) -> Iterator[Read]:
+    def _about_shifted(self, points: Array, weights: Array) -> Iterator[Read]:
         """The shift from the axis that is likely for loaded nodes."""
-        assert self.points is not None
-        points, weights, places = self.points[rows], np.abs(values[rows]), self.scene.contact_points
-        shift = np.average(points, axis=0, weights=weights)
+        places, shift = self.scene.contact_points, np.average(points, axis=0, weights=weights)
         for _ in range(REFINEMENTS):  # the weighted mean vector from the nearest asperities
             near = places[self._nearest(points - shift)[1]]
             shift = np.average(points - near, axis=0, weights=weights)
