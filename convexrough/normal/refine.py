@@ -55,8 +55,7 @@ class Trial:
     @property
     def local(self) -> Array:
         """(n,) k P^(2/3), to float64."""
-        local: Array = hertz.indentation(self.loads.high, self.problem.coefficients)
-        return local
+        return np.asarray(hertz.indentation(self.loads.high, self.problem.coefficients))
 
     @cached_property
     def inside(self) -> NDArray[np.bool_]:

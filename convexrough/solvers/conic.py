@@ -111,8 +111,7 @@ class ConeBoxes:
 
     def energies(self, problem: NormalProblem) -> Array:
         """(m,) k B^(5/3). The local energy at P = B t^3 is k B^(5/3) ((3/5) t^5 - (S/3) t^6)."""
-        energies: Array = problem.coefficients[self.members] * np.cbrt(self.loads) ** 5
-        return energies
+        return np.asarray(problem.coefficients[self.members] * np.cbrt(self.loads) ** 5)
 
     def to_candidates(self, problem: NormalProblem, loads: Array) -> Array:
         """(n,) loads of all candidates, from loads (m,) of the members; limited to the boxes."""
@@ -271,10 +270,7 @@ class Conic(ConeSolver):
         super().__post_init__()
         checks.whole("max_iterations", self.max_iterations)
 
-    @property
-    def formulation(self) -> str:
-        """The name without the ending " + Newton step"."""
-        return "conic"
+    formulation = "conic"
 
     def answer(self, problem: NormalProblem, boxes: ConeBoxes) -> ProgramAnswer:
         """Clarabel's loads and approach for these boxes, not yet checked."""
