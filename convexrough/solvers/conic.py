@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough import checks
-from convexrough.arrays import Array, Indices
+from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.convex.cones import FIVE_CONES_LIMIT, FOUR_CONES_LIMIT, power_cones
 from convexrough.errors import InputError, SolverError
 from convexrough.normal.problem import NormalProblem
@@ -115,9 +115,7 @@ class ConeBoxes:
 
     def to_candidates(self, problem: NormalProblem, loads: Array) -> Array:
         """(n,) loads of all candidates, from loads (m,) of the members; limited to the boxes."""
-        everywhere = np.zeros(len(problem))
-        everywhere[self.members] = np.clip(loads, 0.0, self.loads)
-        return everywhere
+        return among_zeros(np.clip(loads, 0.0, self.loads), self.members, len(problem))
 
     def too_dense(self, problem: NormalProblem, solver: str, pressed: Array) -> TooDenseError:
         """The error for the members with `pressed` > 0, which are its `ratios`."""
