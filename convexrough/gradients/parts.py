@@ -135,8 +135,6 @@ class Part:
 def product(level: Level, weights: Ball) -> Ball:
     """A times weights. Radii count as if all entries of A were the largest one."""
     coupled = level.problem.product(weights.mid)
-    if not weights.radius.any():
-        return coupled
     spread = weights.radius.sum() * level.problem.largest_entry
     return Ball.around(coupled.mid, coupled.radius + spread)
 
