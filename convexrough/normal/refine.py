@@ -165,9 +165,7 @@ def corrected(problem: NormalProblem, state: Trial, enough: Any, todo: NDArray[n
     defect /= np.where(size > 0, size, 1.0)
     step = problem.correct(slopes, defect, enough, todo)
     step *= size
-    k, gap = problem.coefficients, state.gap.value
-    if k.shape != step.shape:  # of a stack
-        k = np.broadcast_to(k, step.shape)
+    k, gap = np.broadcast_to(problem.coefficients, step.shape), state.gap.value
 
     def stepped(some: slice) -> Pair:
         """The loads after the step, not yet changed to have the prescribed total."""
