@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from convexrough import checks
 from convexrough.arrays import Array, frozen
-from convexrough.contact import Contact
+from convexrough.contact import Contact, mean_pressures
 from convexrough.friction.cycle import Cycle
 from convexrough.friction.state import states_of, stick_radii
 from convexrough.plottable import Plottable
@@ -92,14 +92,15 @@ def fretting(cycle: Cycle) -> Fretting:
     gross = cycle.slips / 2.0 + unknown
     a = stick_radii(levels, levels.at(walk.least))[0]
     rim = f * float(mindlin.ratio(scene.material.poisson_ratio)) * a**2 / R
-    in_part = rim * rim_gap(np.minimum(_over(cycle.stick_radii, a), 1.0))
+    stuck = np.divide(cycle.stick_radii, a, out=np.zeros(len(a)), where=a > 0)
+    in_part = rim * rim_gap(np.minimum(stuck, 1.0))
     mean = largest = np.full(len(scene), unknown)
     known = cache(lambda load: stick_radii(levels, levels.at(load))[0])
     every = states_of(levels, walk.steady).forces.value
     for k, (curve, forces) in enumerate(zip(walk.steady, every, strict=True), 1):
         LOGGER.info(f"tractions at point {k:,} of {len(every):,}")
         bends = [(load, float(bend)) for load, bend in curve.bends if bend and load]
-        mean = np.maximum(mean, _over(np.abs(forces), np.pi * known(curve.load) ** 2))
+        mean = np.maximum(mean, mean_pressures(np.abs(forces), known(curve.load)))
         radii = [known(load) for load, _ in bends]
         largest = np.maximum(largest, _largest(np.array([bend for _, bend in bends]), radii))
     return Fretting(
@@ -145,8 +146,3 @@ def fretting_columns(worn: Sequence[Fretting]) -> dict[str, NDArray[Any]]:
         every |= each.columns()
         rows.append({name: column[each.contact.loads > 0] for name, column in every.items()})
     return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
-
-
-def _over(part: Array, whole: Array) -> Array:
-    """(n,) part / whole; 0 where whole is 0."""
-    return np.asarray(np.divide(part, whole, out=np.zeros(len(whole)), where=whole > 0))

@@ -182,7 +182,8 @@ class Stepper:
         modulus = scene.material.contact_modulus
         self.levels = levels
         self.coefficients = hertz.local_coefficient(modulus, scene.relative_radii)
-        self.A = couple(scene, np.arange(len(scene)), 1.0 / (np.pi * modulus), "dense").matrix
+        self.influence = couple(scene, np.arange(len(scene)), 1.0 / (np.pi * modulus), "dense")
+        self.A = self.influence.matrix
 
     def start(self, load: Fraction) -> Bundle:
         """The state without shear at a load."""

@@ -8,7 +8,7 @@ an inverse.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from itertools import pairwise
 from typing import Literal, NamedTuple
@@ -59,9 +59,8 @@ def order_between(
     rising = ~top.open
     if len(used) == 1 or proved_between(top, at(used[-1]), rising, most):
         return "proved"
-    if any(_falls(at(high), at(low), rising) for high, low in pairwise(used)) or any(
-        _falling_rate(at(load), rising) for load in used
-    ):
+    levels = [at(load) for load in used]
+    if _falls(levels, levels, rising):
         return "fails"
     unproved = [(used[0], used[-1])]
     left = BETWEEN if rising.sum() <= INVERTED else FEW_BETWEEN
@@ -73,11 +72,7 @@ def order_between(
             level = at(middle)
         except SolverError:  # the intermediate level could not be computed
             return "proved for one step"
-        if (
-            _falls(at(high), level, rising)
-            or _falls(level, at(low), rising)
-            or _falling_rate(level, rising)
-        ):
+        if _falls([at(high), level, at(low)], [level], rising):
             return "fails"
         for a, b in ((high, middle), (middle, low)):
             if rising.sum() > INVERTED or not proved_between(at(a), at(b), rising, most):
@@ -145,12 +140,12 @@ class _Span(NamedTuple):
     c: Array  # diagonal of C~
     drop: Array  # F = D0(L1) - D0(L0)
     depth: Array  # lower bounds on the indentations at L1
-    gaps: Array  # lower bounds on the gaps at L1
+    spare: Array  # largest u of the corollary: open asperities with rates above -u stay open
     steep: Array  # k^(3/2), with the coefficient k of Hertz's law n = k P^(2/3)
     regular: NDArray[np.bool_]  # true if I + A C is regular for 0 <= C <= C~
 
     @classmethod
-    @np.errstate(invalid="ignore")
+    @np.errstate(divide="ignore", invalid="ignore")
     def of(cls, high: Rows, low: Rows, k: Ball, box: Box) -> _Span:
         support = ~high.open
         c = np.where(support, 1.5 * np.cbrt(high.loads.upper) / k.lower * (1 + SAFETY), 0.0)
@@ -158,14 +153,15 @@ class _Span(NamedTuple):
         # C~^-1 + A >= (1 - theta e) C~^-1 where C~ <= e H^-1.
         e = np.where(support, c * box.compliance, 0.0).max(axis=1, keepdims=True)
         drop, depth = (high.approach - low.approach).upper[:, None], high.indentation.lower
-        gaps = np.maximum(-high.indentation.upper, 0.0)
+        gaps = np.maximum(-high.indentation.upper, 0.0)  # at least
+        spare = np.nan_to_num(gaps / drop, posinf=np.inf) * (1 - SAFETY)
         steep = np.broadcast_to(k.upper**1.5, c.shape)
         regular = np.asarray(box.convexity_number * e < 1 - SAFETY)
-        return cls(support, c, drop, depth, gaps, steep, regular)
+        return cls(support, c, drop, depth, spare, steep, regular)
 
     def at(self, which: Indices) -> _Span:
         """The same quantities for only s asperities of each row, given by indices (m, s)."""
-        wide = ("support", "c", "depth", "gaps", "steep")
+        wide = ("support", "c", "depth", "spare", "steep")
         return self._replace(
             **{name: np.take_along_axis(getattr(self, name), which, axis=1) for name in wide}
         )
@@ -191,12 +187,6 @@ class _Span(NamedTuple):
     def unsettled(self, rates: Array, rising: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """(m, n) true where order is not proved: the rate may be negative, or the gap may close."""
         return np.asarray(~((rates > 0) | (~rising & (rates > -self.spare))))
-
-    @property
-    def spare(self) -> Array:
-        """(m, n) largest u of the corollary: open asperities with rates above -u stay open."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(np.nan_to_num(self.gaps / self.drop, posinf=np.inf) * (1 - SAFETY))
 
     def _delta(self, m: Array) -> Array:
         """(m, s) the smallest delta of the corollary, for bounds m on the rates."""
@@ -239,16 +229,17 @@ class _Span(NamedTuple):
         return np.where(sure.all(axis=1, keepdims=True), below, -np.inf)
 
 
-def _falls(upper: Level, lower: Level, rising: NDArray[np.bool_]) -> bool:
-    """True unless each asperity is proved open at `lower`, or is rising and is proved to have a
-    larger indentation at `upper` than at `lower`.
+def _falls(steps: Sequence[Level], rated: Sequence[Level], rising: NDArray[np.bool_]) -> bool:
+    """True if a rate at the levels `rated` is negative, or if, from one of `steps` to the next
+    lower one, an asperity is neither proved open there nor rising and proved to fall.
     """
-    if upper.box is None:
-        return True
-    if lower.box is None:
-        return float(lower.load.size) > 0
-    grows = (upper.indentation - lower.indentation).positive
-    return not (lower.open | (rising & grows)).all()
+    for upper, lower in pairwise(steps):
+        if upper.box is None or (lower.box is None and float(lower.load.size) > 0):
+            return True
+        grows = (upper.indentation - lower.indentation).positive
+        if lower.box is not None and not (lower.open | (rising & grows)).all():
+            return True
+    return any(_falling_rate(level, rising) for level in rated)
 
 
 def _falling_rate(level: Level, rising: NDArray[np.bool_]) -> bool:

@@ -22,7 +22,7 @@ from convexrough.errors import SolverError
 from convexrough.friction.general_step import OwnStep, Step, Stepper
 from convexrough.friction.order import Order
 from convexrough.friction.path import LoadPath, path_of, walk_of
-from convexrough.influence import Kind, couple
+from convexrough.influence import Kind
 from convexrough.influence.shells import shells
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
@@ -191,9 +191,7 @@ class ConicStepper(Stepper):
         from scipy import sparse  # 0.1 s to import: only when solving
 
         n, N, own, parts = len(which), *(it[which] for it in (step.loads, step.own, step.parts))
-        modulus = self.levels.scene.material.contact_modulus
-        coupled = couple(self.levels.scene, which, 1.0 / (np.pi * modulus), "dense")
-        wells = shells(coupled) if n > 1 else np.zeros(n)
+        wells = shells(self.influence.restricted(which))
         shifts = wells * N * parts / own  # `wells` in the units of the pieces
         if 1.5 * shifts.max(initial=0.0) > FIVE_CONES_LIMIT:
             raise SolverError("too dense for a convex program", solver="conic step")

@@ -147,12 +147,6 @@ def asperity_losses(high: Rows, low: Rows) -> tuple[Ball, Ball]:
     return where(moved, slip, nothing), where(moved, slide, nothing)
 
 
-def trapezoid_loss(high: Level, low: Level) -> Ball:
-    """B(P, L): twice the integral of D0 from L to P, minus twice its trapezoid-rule value."""
-    run = high.load - low.load
-    return (high.energy - low.energy) * 2.0 - run * (high.approach + low.approach)
-
-
 def losses(levels: FrictionLevels, costs: Sequence[Sequence[Piece]]) -> Ball:
     """(m,) the loss on each of m segments of a path, from the pieces of each segment."""
     pieces = [piece for each in costs for piece in each]

@@ -183,7 +183,8 @@ def _cycle(contact: Contact, closed: Closed, spent: Ball, moved: Ball) -> Cycle:
     reference = smooth_reference(contact.scene, contact.load) if levels.load else None
     defect = smooth = np.nan
     if set(loaded) == {levels.load}:
-        other = state.trapezoid_loss(top, rest) * 4.0 * levels.loss_unit
+        mean, run = (top.approach + rest.approach) * 0.5, top.load - rest.load
+        other = (top.energy - rest.energy - run * mean) * 8.0 * levels.loss_unit
         defect = abs(float(other.value) - loss) / (loss or 1.0)
         if reference:
             smooth = float(mindlin.loss(float((max(heights) - min(heights)) / (2 * levels.load))))

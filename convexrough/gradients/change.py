@@ -209,8 +209,6 @@ class _Bent:
     """The changes of a scene's geometry and modulus in one direction."""
 
     everywhere: Bending  # of all asperities
-    here: Bending  # of the candidates: the asperities that can touch
-    geometry: Geometry  # of the candidates
     modulus: float  # dlog E*, the relative change of the contact modulus
 
     @classmethod
@@ -232,9 +230,7 @@ class _Bent:
         every = Geometry.of(problem, np.arange(n))
         bent = every.bent(*(Ball.exact(each) for each in changes))
         bent = bent._replace(local=bent.local - modulus * 2.0 / 3.0)
-        which = problem.candidates
-        here = Bending(*(each[which] for each in bent))
-        return cls(bent, here, Geometry.of(problem, which), float(modulus.value))
+        return cls(bent, float(modulus.value))
 
     def of_level(self, level: Level, total: Ball) -> tuple[Response, Ball]:
         """The solution of  dP / c + A dP = dd - C dlog k - dA P + dD0,  sum dP = total.
@@ -242,13 +238,15 @@ class _Bent:
         C is the diagonal matrix of indentations, and c_i is the local stiffness of asperity i. The
         second result is (n,) dA P + A dP - dd - dD0, the changes of gaps of open asperities.
         """
-        felt, points = Part(level).coupled * -self.modulus, self.here.points  # dA P
+        problem, P = level.problem, level.loads
+        which, felt = problem.candidates, Part(level).coupled * -self.modulus  # dA P
+        offsets, local, points = (each[which] for each in self.everywhere)
         if points.value.any():
-            every, P = np.arange(len(level.problem)), level.loads
             carried = [P, points[:, 0] * P, points[:, 1] * P]
-            by_points, by_x, by_y = self.geometry.slopes(carried, every)
+            geometry = Geometry.of(problem, which)
+            by_points, by_x, by_y = geometry.slopes(carried, np.arange(len(which)))
             felt = felt + (points * by_points).sum() - by_x[:, 0] - by_y[:, 1]
-        raised = self.here.offsets / level.problem.units.length - felt
-        right = raised - level.indentation.positive_part() * self.here.local
+        raised = offsets / problem.units.length - felt
+        right = raised - level.indentation.positive_part() * local
         moved = level.response(right, total)
         return moved, product(level, moved.loads) - raised - moved.approach

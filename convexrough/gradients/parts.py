@@ -25,6 +25,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from convexrough import threads
 from convexrough.arithmetic.balls import Ball, joined, of_rows, where
 from convexrough.arrays import Indices
 from convexrough.errors import InputError
@@ -134,8 +135,6 @@ class Part:
 def product(level: Level, weights: Ball) -> Ball:
     """A times weights. Radii count as if all entries of A were the largest one."""
     coupled = level.problem.product(weights.mid)
-    if not weights.radius.any():
-        return coupled
     spread = weights.radius.sum() * level.problem.largest_entry
     return Ball.around(coupled.mid, coupled.radius + spread)
 
@@ -226,16 +225,11 @@ class Geometry:
 
     def _in_balls(self, loads: Sequence[Ball], which: Indices) -> list[Ball]:
         points = (self.points * self.share if self.closest else self.points)[which]  # c
-        scale, n = self.problem.exact.scale, len(which)
+        scale, every = self.problem.exact.scale, np.arange(len(which))
         found: list[list[Ball]] = [[] for _ in loads]
-        rows = max(1, BLOCK // max(1, n))
-        for start in range(0, n, rows):
-            some = np.arange(start, min(start + rows, n))
-            itself = (np.arange(len(some)), some)
+        for some in threads.chunks(len(which), max(1, BLOCK // max(1, len(which)))):
             x, y = (points[some, k][:, None] - points[None, :, k] for k in (0, 1))
-            squares = x * x + y * y
-            apart = np.ones(squares.shape, dtype=bool)
-            apart[itself] = False
+            squares, apart = x * x + y * y, every[some, None] != every
             squares = where(apart, squares, 1.0 + 0.0 * squares)
             falloff = where(apart, -scale / (squares * squares.sqrt()), 0.0 * squares)
             x, y = x * falloff, y * falloff

@@ -199,8 +199,6 @@ def crowded(problem: NormalProblem, loads: Array) -> Indices:
     asperities whose shells of radius t_i meet another shell; if no shells meet, all of them.
     """
     which = np.flatnonzero(loads)
-    if len(which) < 2:
-        return which
     influence = problem.influence.restricted(which)
     t = influence.scale / problem.compliance(loads)[which]
     distances, others, closest = nearest(influence.points, t)

@@ -12,6 +12,7 @@ from contextlib import suppress
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough import threads
 from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array
 from convexrough.errors import ProofError, SolverError
@@ -79,13 +80,11 @@ class Levels:
         able = self._together and problem.influence.stored and len(problem) <= MOST
         if not able or self.top.box is None:
             return [None] * len(loads)
-        some, levels = max(1, NUMBERS // len(problem)), list[Level | None]()
-        closed = self.top.box.closed(problem)
+        levels, closed = list[Level | None](), self.top.box.closed(problem)
         fixed = problem.exact, problem.shells, problem.squares
-        for start in range(0, len(loads), some):
-            totals = loads[start : start + some]
-            to = start + len(totals)
-            LOGGER.info(f"normal problems {start + 1:,} to {to:,} of {len(loads):,}")
+        for some in threads.chunks(len(loads), max(1, NUMBERS // len(problem))):
+            totals = loads[some]
+            LOGGER.info(f"normal problems {some.start + 1:,} to {some.stop:,} of {len(loads):,}")
             rows = [(slice(0, len(totals)), problem)]
             level, good = solved(Stack.of(rows, *fixed, totals[:, None], by_load=True), closed)
             for k in range(len(totals)):

@@ -311,8 +311,7 @@ class NormalProblem:
     def compliance(self, loads: Array, which: Indices | slice = slice(None)) -> Array:
         """(n,) the local part h_i = (2/3) k_i P_i^(-1/3) = 1 / (2 E* a_i) of the Hessian of Phi."""
         with np.errstate(divide="ignore"):
-            h: Array = (2.0 / 3.0) * self.coefficients[which] / np.cbrt(loads)
-        return h
+            return np.asarray((2.0 / 3.0) * self.coefficients[which] / np.cbrt(loads))
 
     def convexity_number(self, loads: Array) -> float:
         """The largest shells_i / h_i with the `compliance` h at `loads`; below 1 the energy is

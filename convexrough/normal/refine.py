@@ -55,8 +55,7 @@ class Trial:
     @property
     def local(self) -> Array:
         """(n,) k P^(2/3), to float64."""
-        local: Array = hertz.indentation(self.loads.high, self.problem.coefficients)
-        return local
+        return np.asarray(hertz.indentation(self.loads.high, self.problem.coefficients))
 
     @cached_property
     def inside(self) -> NDArray[np.bool_]:
@@ -166,9 +165,7 @@ def corrected(problem: NormalProblem, state: Trial, enough: Any, todo: NDArray[n
     defect /= np.where(size > 0, size, 1.0)
     step = problem.correct(slopes, defect, enough, todo)
     step *= size
-    k, gap = problem.coefficients, state.gap.value
-    if k.shape != step.shape:  # of a stack
-        k = np.broadcast_to(k, step.shape)
+    k, gap = np.broadcast_to(problem.coefficients, step.shape), state.gap.value
 
     def stepped(some: slice) -> Pair:
         """The loads after the step, not yet changed to have the prescribed total."""

@@ -46,7 +46,6 @@ from convexrough import checks
 from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array
 from convexrough.convex.definite import is_definite
-from convexrough.errors import SolverError
 from convexrough.normal.law import on_hertz_pressure
 from convexrough.normal.problem import NormalProblem
 from convexrough.solvers.conic import TooDenseError
@@ -136,7 +135,7 @@ class BristleProgram:
     def assemble(cls, problem: NormalProblem, m: int, solver: str) -> BristleProgram:
         n = len(problem)
         checks.fits_in_memory("asperities of the bristle program", n, 60 * n + 1000 * m)
-        return cls(problem, m, solver, *_convex_box(problem, solver))
+        return cls(problem, m, solver, *_convex_box(problem))
 
     def apply(self) -> QuadraticProgram:
         """The program, with constraints phi_ij >= 0, sum_j e_ij / m = 0, and the given load."""
@@ -190,7 +189,7 @@ class BristleProgram:
             raise TooDenseError(self.solver, problem.candidates[beyond], ratios, LARGEST_S)
 
 
-def _convex_box(problem: NormalProblem, solver: str) -> tuple[Array, NDArray[np.bool_], Array]:
+def _convex_box(problem: NormalProblem) -> tuple[Array, NDArray[np.bool_], Array]:
     """The upper ends B (n,); a mask (n,), True where B was cut; and the matrix A + diag(h)."""
     trial = hertz.load(on_hertz_pressure(problem), problem.coefficients)
     approach_bound = problem.overhang(trial, problem.plain_product(Pair.exact(trial)))
@@ -198,15 +197,8 @@ def _convex_box(problem: NormalProblem, solver: str) -> tuple[Array, NDArray[np.
         faces = (2.0 / 3.0 * problem.coefficients * LARGEST_S / problem.shells) ** 3
     whole = problem.bounds(approach_bound)
     whole = np.maximum(whole, np.minimum(faces, SMALLEST_BOX * whole.max()))
-    for box in (whole, np.minimum(whole, faces)):
-        h = problem.compliance(box)
-        root = np.sqrt(1.0 / h)
-        scaled = problem.influence.matrix * root * root[:, None]
-        np.fill_diagonal(scaled, 1.0 - MARGIN)
-        if is_definite(scaled):
-            return box, box < whole, problem.influence.matrix + np.diag(h)
-    raise SolverError(
-        f"the matrix is not positive definite by {MARGIN:g} of its diagonal at S = {LARGEST_S:g}",
-        solver=solver,
-        advice="try solvers.Conic(), or Newton's method",
-    )
+    root = np.sqrt(1.0 / problem.compliance(whole))
+    scaled = problem.influence.matrix * root * root[:, None]
+    np.fill_diagonal(scaled, 1.0 - MARGIN)
+    box = whole if is_definite(scaled) else np.minimum(whole, faces)
+    return box, box < whole, problem.influence.matrix + np.diag(problem.compliance(box))

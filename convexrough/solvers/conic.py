@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough import checks
-from convexrough.arrays import Array, Indices
+from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.convex.cones import FIVE_CONES_LIMIT, FOUR_CONES_LIMIT, power_cones
 from convexrough.errors import InputError, SolverError
 from convexrough.normal.problem import NormalProblem
@@ -111,14 +111,11 @@ class ConeBoxes:
 
     def energies(self, problem: NormalProblem) -> Array:
         """(m,) k B^(5/3). The local energy at P = B t^3 is k B^(5/3) ((3/5) t^5 - (S/3) t^6)."""
-        energies: Array = problem.coefficients[self.members] * np.cbrt(self.loads) ** 5
-        return energies
+        return np.asarray(problem.coefficients[self.members] * np.cbrt(self.loads) ** 5)
 
     def to_candidates(self, problem: NormalProblem, loads: Array) -> Array:
         """(n,) loads of all candidates, from loads (m,) of the members; limited to the boxes."""
-        everywhere = np.zeros(len(problem))
-        everywhere[self.members] = np.clip(loads, 0.0, self.loads)
-        return everywhere
+        return among_zeros(np.clip(loads, 0.0, self.loads), self.members, len(problem))
 
     def too_dense(self, problem: NormalProblem, solver: str, pressed: Array) -> TooDenseError:
         """The error for the members with `pressed` > 0, which are its `ratios`."""
@@ -271,10 +268,7 @@ class Conic(ConeSolver):
         super().__post_init__()
         checks.whole("max_iterations", self.max_iterations)
 
-    @property
-    def formulation(self) -> str:
-        """The name without the ending " + Newton step"."""
-        return "conic"
+    formulation = "conic"
 
     def answer(self, problem: NormalProblem, boxes: ConeBoxes) -> ProgramAnswer:
         """Clarabel's loads and approach for these boxes, not yet checked."""

@@ -243,5 +243,4 @@ class LiftedModel:
     @property
     def gaps(self) -> Array:
         """(m,) gaps of the latest solution in scaled units, from the multipliers of `link`."""
-        gaps: Array = np.maximum(-self.link.dual_value, 0.0)
-        return gaps
+        return np.asarray(np.maximum(-self.link.dual_value, 0.0))

@@ -83,17 +83,13 @@ def _mean_field(problem: NormalProblem) -> Array:
         slopes = 1.5 * loads / np.where(loads > 0, indentation, 1.0)
         P, c = sums(loads), sums(slopes)
         defect = w - K @ P
-        system = np.eye(count) + K * c
+        system, right = np.eye(count) + K * c, -defect
         if problem.load is not None:
             # The change of the approach is one more unknown, the load one more equation.
             system = np.block([[system, -(K @ c)[:, None]], [-c[None, :], c.sum()]])
-            missing = problem.load - float(P.sum())
-            step = np.linalg.solve(system, np.append(-defect, missing))
-            approach += step[-1]
-            w = w + step[:-1]
-        else:
-            step = np.linalg.solve(system, -defect)
-            w = w + step
+            right = np.append(right, problem.load - float(P.sum()))
+        step = np.linalg.solve(system, right)
+        w, approach = w + step[:count], approach + float(step[count:].sum())
         if np.abs(step).max() <= 1e-6 * abs(approach):
             break
     return np.asarray(approach + problem.offsets - between(w, places))

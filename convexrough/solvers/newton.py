@@ -141,20 +141,19 @@ class Newton:
         """Loads, approach, number of steps, and the trial to be refined, if there is one."""
         indentation = _start(problem, start)
         near, iterations = np.arange(len(problem)), 0
+        refines = problem.influence.cheap_sums and not self.tolerance > 0
         if len(problem) > ALL_ITERATED and start is None:
             highest = float(np.maximum(problem.approach_bound + problem.offsets, 0.0).max())
             near = np.flatnonzero(indentation > -MARGIN * highest)
         while True:
             begin = indentation[near]
             del indentation  # saves memory
-            state, steps = self._iterate(problem, near, begin)
+            state, steps = self._iterate(problem, near, begin, refines)
             iterations += steps
             loads = among_zeros(state.forces, near, len(problem))
             unknown, approach = state.unknown, float(state.at.approach)
             del state  # saves memory
-            trial = None
-            if self._refines(problem):
-                trial = trial_of(problem, loads, problem.pressed_product)
+            trial = trial_of(problem, loads, problem.pressed_product) if refines else None
             if len(near) == len(problem):
                 return loads, approach, iterations, trial
             # The iteration left out some asperities: compute the gaps of all.
@@ -168,16 +167,13 @@ class Newton:
             touched[near] = True  # `near` only grows, so the loop ends
             near = np.flatnonzero(touched | (indentation > -MARGIN * highest))
 
-    def _refines(self, problem: NormalProblem) -> bool:
-        return problem.influence.cheap_sums and not self.tolerance > 0
-
     def _iterate(
-        self, problem: NormalProblem, near: Indices, indentation: Array
+        self, problem: NormalProblem, near: Indices, indentation: Array, refines: bool
     ) -> tuple[newton.Iterate, int]:
         """The solution in which only the asperities `near` carry loads, and the number of steps."""
         part = problem if len(near) == len(problem) else problem.restricted(near)
         law, left = Pressing(part, float(np.abs(problem.offsets).max())), 0.0
-        if self._refines(problem):  # refinement makes the remaining linear correction
+        if refines:  # refinement makes the remaining linear correction
             left = NEGLIGIBLE * float(np.linalg.norm(np.maximum(indentation, 0.0)))
         try:
             state = law.evaluate(indentation)

@@ -207,8 +207,7 @@ def _by_exhaustion(problem: FrictionProblem, state: VectorState, total: Ball) ->
     if size == 0.0:
         return unproved
     t = total.value / size
-    squares = total * total
-    left = problem.load_balls.sum() - (squares[0] + squares[1]).sqrt()
+    left = problem.load_balls.sum() - total.dot(total).sqrt()
     unused = max(float(left.upper), 0.0) + problem.stray
     most = np.where(sure, problem.most, 0.0)
     turned = np.minimum(np.sqrt(2.0 * most * unused), 2.0 * most)

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 
@@ -62,14 +62,7 @@ class FrictionNewton:
         state, iterations = newton.solve(law, start, self.tolerance, 0.0, self.max_iterations)
         sizes = np.hypot(*state.unknown.T)
         slips = along(np.maximum(sizes - problem.thresholds, 0.0), state.unknown, sizes)
-        return VectorState(total, state.forces, state.at.displacement, slips, iterations)
-
-
-class _At(NamedTuple):
-    """Values at a state that are not among the fields of `newton.Iterate`."""
-
-    roots: Array  # (n, 2, 2) W
-    displacement: Array  # (2,) the best estimate of X; its size is the scale of residuals
+        return VectorState(total, state.forces, state.at, slips, iterations)
 
 
 @dataclass(frozen=True)
@@ -112,7 +105,7 @@ class _Friction:
             residual=residual,
             scale=scale,
             noise=ROUNDOFF * scale,  # ends the iteration on symmetric layouts
-            at=_At(roots, displacement),
+            at=displacement,  # the best estimate of X
         )
 
     def direction(self, state: newton.Iterate, left: float) -> Array:
@@ -123,7 +116,7 @@ class _Friction:
         from scipy.linalg.lapack import dpotrf, dpotrs  # 0.2 s to import: only when solving
 
         problem, n = self.problem, len(self.problem)
-        roots = state.at.roots
+        roots = _roots(problem, state.unknown)
         scaled = problem.kernel
         for _ in range(2):  # B W, then W'B W
             scaled = np.einsum("rjc,jcb->rjb", scaled.reshape(2 * n, n, 2), roots)
@@ -133,18 +126,11 @@ class _Friction:
         right = np.concatenate((pushed[:, :, None], turned), axis=2).reshape(2 * n, 3)
         matrix = scaled + np.eye(2 * n)
         factor, info = dpotrf(matrix.T, lower=1, clean=0)
-        if info != 0:
+        if info != 0:  # with the diagonal, all eigenvalues are at least 1, up to rounding
             slopes = np.einsum("nij,nij->nj", roots, roots).reshape(-1)
-            matrix[np.diag_indices(2 * n)] += (
-                np.repeat(problem.share * problem.compliance, 2) * slopes
-            )
-            factor, info = dpotrf(matrix.T, lower=1, clean=0)
-        if info != 0:
-            raise SolverError(
-                "the shifted matrix is not positive definite",
-                solver=self.solver,
-                iterate=state.forces,
-            )
+            shift = np.repeat(problem.share * problem.compliance, 2)
+            matrix[np.diag_indices(2 * n)] += shift * slopes
+            factor, _ = dpotrf(matrix.T, lower=1, clean=0)
         solved = dpotrs(factor, right, lower=1)[0].reshape(n, 2, 3)
         forces = np.einsum("nij,njk->nik", roots, solved)  # dq = W y
         sums = forces.sum(axis=0)

@@ -30,7 +30,7 @@ from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.contact import Contact
 from convexrough.convex.definite import proved_margin
 from convexrough.friction.levels import FrictionLevels
-from convexrough.influence import Influence, couple
+from convexrough.influence import Influence
 from convexrough.influence.shells import shells
 from convexrough.normal.boxes import Scope
 from convexrough.roundoff import ROUNDOFF, SAFETY, SUM_ROUNDOFFS
@@ -76,7 +76,7 @@ class FrictionProblem:
 
     def __init__(self, contact: Contact) -> None:
         self.levels = levels = contact.cached(FrictionLevels)
-        self.units, self._scene, self._kind = levels.units, contact.scene, contact.influence
+        self.units, self._scene = levels.units, contact.scene
         self.scope: Scope = contact.certificate.scope if levels.proved else "none"
         level = levels.top
         self.places = np.flatnonzero(level.loads.value > 0)
@@ -107,9 +107,7 @@ class FrictionProblem:
     @cached_property
     def influence(self) -> Influence:
         """The operator A."""
-        scale = self.units.force / self.units.length
-        scale /= np.pi * self._scene.material.contact_modulus
-        return couple(self._scene, self.touching, scale, self._kind)
+        return self.levels.top.problem.influence.restricted(self.places)
 
     @cached_property
     def kernel(self) -> Array:
