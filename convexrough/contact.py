@@ -25,9 +25,9 @@ from convexrough.normal.certificate import Certificate, certificate_of, certify_
 from convexrough.normal.exact import Units
 from convexrough.normal.level import Level
 from convexrough.normal.levels import Levels
-from convexrough.normal.problem import NormalProblem
+from convexrough.normal.problem import ALL_SHARP, NormalProblem
 from convexrough.normal.proved import proved
-from convexrough.normal.refine import Trial, refined_loads, sharpened
+from convexrough.normal.refine import Trial, is_of, refined_loads, sharpened
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
 from convexrough.record import Along, Table
@@ -45,7 +45,8 @@ FEW = 128
 #: centre. There the displacements by a point force are 5 % too small, at the rim of the disc 15 %.
 BESIDE = 1.5
 
-#: A contact of at most this many asperities that can touch keeps what friction needs of its press.
+#: A contact of at most this many asperities that can touch keeps what friction needs of its press;
+#: if the operator is a matrix, of at most `ALL_SHARP`.
 MOST_KEPT = 2**16
 
 if TYPE_CHECKING:
@@ -301,7 +302,7 @@ def levels_of(contact: Contact) -> Levels:
     if top is None:  # prove the loads again
         load = contact.prescribed_load
         approach = contact.approach if load is None else None
-        problem = assembled(solver, contact.scene, approach, load, contact.influence)
+        problem = assembled(solver, contact.scene, approach, load, contact.influence).sharpened()
         given = contact.loads[problem.candidates] / problem.units.force
         top = proved(problem, refined_loads(problem, given))
     state = top.trial
@@ -352,7 +353,7 @@ def _contact(
             solution = _solved(solver, problem, first)
         state = solution.trial
         if refine := bool(solution.refine and len(problem)):
-            if state is None or not np.array_equal(state.loads.high, solution.loads):
+            if not is_of(state, problem, solution.loads):
                 state = refined_loads(problem, solution.loads, problem.pressed_product)
             corrected = not np.array_equal(state.loads.high, solution.loads)
             solution = replace(solution, loads=state.loads.high)
@@ -363,7 +364,8 @@ def _contact(
             assert state is not None
             level = proved(problem, state)
             certificate = certificate_of(level, loads, state)
-            top = level if len(problem) <= MOST_KEPT else None
+            most = ALL_SHARP if problem.influence.stored else MOST_KEPT
+            top = level if len(problem) <= most else None
         else:
             certificate = certify_on(problem, loads)
     said = isinstance(solver, solvers.Newton) or solver.name.endswith("Newton step")

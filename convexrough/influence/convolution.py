@@ -230,7 +230,7 @@ def through_waves(
     from scipy import fft
 
     height, width = padded
-    if workers == 1:  # arrays are small, so fewer calls count for more than the cache
+    if height * width <= threads.MANY:  # small: fewer calls count for more than the cache
         found = [*fields]
         waves = [fft.fft(fft.rfft(each[:, :width], axis=1), height, axis=0) for each in found]
         for field, wave in zip(found, mix(waves, slice(None)), strict=True):

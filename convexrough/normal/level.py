@@ -219,7 +219,7 @@ class Level:
         """
         problem, springs, n = self.problem, self.springs, len(self.problem)
         some = np.arange(n)
-        if problem.influence.cheap_sums:  # leave out asperities that are open
+        if problem.influence.cheap_sums and springs.margin > 0:  # leave out those that are open
             some = np.flatnonzero(springs.touching | springs.doubtful)
             problem, right = problem.restricted(some), right[some]
             springs = springs.at(some)

@@ -21,7 +21,7 @@ from convexrough.normal.law import Pressed, on_hertz_pressure
 from convexrough.normal.level import Level
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.proved import proved, solution_in
-from convexrough.normal.refine import Trial, defect_of, refined_loads, rounding_of
+from convexrough.normal.refine import Trial, defect_of, is_of, refined_loads, rounding_of
 from convexrough.normal.stack import Stack
 from convexrough.progress import LOGGER
 from convexrough.roundoff import ROUNDOFF
@@ -107,7 +107,7 @@ class Levels:
 
         def sought(start: Array | None) -> Level:
             loads, trial = self._press(problem, start)
-            state = trial or refined_loads(problem, loads)
+            state = trial if is_of(trial, problem, loads) else refined_loads(problem, loads)
             return proved(problem, state, box and box.closed(problem))
 
         if box is not None and box.scope == "local":

@@ -156,7 +156,7 @@ class NormalProblem:
 
     @property
     def precise(self) -> bool:
-        """True if a press refines loads to as many digits as friction needs."""
+        """True if `pressed_product` has all digits that friction needs."""
         A = self.influence
         if self.sharp or not isinstance(A, LatticeInfluence | DenseInfluence):
             return True

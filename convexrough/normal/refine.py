@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -134,6 +134,13 @@ def refined(problem: NormalProblem, best: Trial) -> Trial:
 def refined_loads(problem: NormalProblem, loads: Array, product: Product | None = None) -> Trial:
     """The refined trial that starts from loads (n,) >= 0 of any solver."""
     return refined(problem, trial_of(problem, loads, product, roughly=True))
+
+
+def is_of(state: Trial | None, problem: NormalProblem, loads: Array) -> TypeGuard[Trial]:
+    """True for a trial of this problem, whose loads are `loads` (n,) to more digits."""
+    return (
+        state is not None and state.problem is problem and np.array_equal(state.loads.high, loads)
+    )
 
 
 def sharpened(problem: NormalProblem, state: Trial) -> Trial:

@@ -148,7 +148,7 @@ class Newton:
         while True:
             begin = indentation[near]
             del indentation  # saves memory
-            state, steps = self._iterate(problem, near, begin, refines)
+            state, steps = self._iterate(problem, near, begin, refines and not problem.precise)
             iterations += steps
             loads = among_zeros(state.forces, near, len(problem))
             unknown, approach = state.unknown, float(state.at.approach)
@@ -168,12 +168,15 @@ class Newton:
             near = np.flatnonzero(touched | (indentation > -MARGIN * highest))
 
     def _iterate(
-        self, problem: NormalProblem, near: Indices, indentation: Array, refines: bool
+        self, problem: NormalProblem, near: Indices, indentation: Array, early: bool
     ) -> tuple[newton.Iterate, int]:
-        """The solution in which only the asperities `near` carry loads, and the number of steps."""
+        """The solution in which only the asperities `near` carry loads, and the number of steps.
+
+        early : True if refinement makes the remaining linear correction
+        """
         part = problem if len(near) == len(problem) else problem.restricted(near)
         law, left = Pressing(part, float(np.abs(problem.offsets).max())), 0.0
-        if refines:  # refinement makes the remaining linear correction
+        if early:
             left = NEGLIGIBLE * float(np.linalg.norm(np.maximum(indentation, 0.0)))
         try:
             state = law.evaluate(indentation)

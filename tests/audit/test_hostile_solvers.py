@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from attacks import ATTACKS, assert_honest, attack
 from friction_scenes import FRICTION, lengths, pressed
-from scenes import NAMED, PAPER_APPROACH, paper, reference
+from scenes import NAMED, PAPER_APPROACH, hexagonal, paper, reference
 
 import convexrough as cr
 from convexrough import FrictionNewton, shear_vector
@@ -30,6 +30,35 @@ class Liar:
         honest = Newton().solve(problem, start)
         rng = np.random.default_rng(self.seed)
         return replace(honest, loads=self.spoil(honest.loads.copy(), rng))
+
+
+@dataclass
+class Elsewhere:
+    """Newton's answer, with all its digits, for other loads or approaches from some call on."""
+
+    honest: int
+    factor: float
+    name: str = "elsewhere"
+
+    def solve(self, problem: Any, start: Any = None) -> Any:
+        self.honest -= 1
+        factor = self.factor if self.honest < 0 else 1.0
+        return Newton().solve(replace(problem, control=problem.control * factor), start)
+
+
+@pytest.mark.parametrize("control", [{"approach": 3e-4}, {"load": 6e-6}], ids=["approach", "load"])
+def test_digits_of_another_problem_are_not_used(control: Any) -> None:
+    scene = replace(hexagonal(spacing=1e-3, tip_radius=5e-3, within=0.0302), friction=0.5)
+    true = cr.press(scene, **control)
+    found = cr.press(scene, **control, solver=Elsewhere(0, 0.9))
+    assert (found.status == true.status).all()
+    assert found.load == pytest.approx(true.load, rel=1e-14)
+    state, known = (
+        cr.shear(contact, force=0.1 * true.load)
+        for contact in (cr.press(scene, **control, solver=Elsewhere(1, 1 + 1e-6)), true)
+    )
+    bounds = state.certificate.force_errors + known.certificate.force_errors
+    assert (np.abs(state.forces - known.forces) <= bounds).all()
 
 
 def put(value: float) -> Spoil:
