@@ -32,7 +32,7 @@ from convexrough.tabular.roles import shortened
 from convexrough.version import __version__
 
 #: The units of columns and statistics; {} stands for the unit of length.
-LENGTHS = dict.fromkeys(("x", "y", "height", "tip_radius", "prominence"), "{}")
+LENGTHS = dict.fromkeys(("x", "y", "height", "tip_radius", "prominence", "deviation"), "{}")
 LENGTHS |= dict.fromkeys(("largest_curvature", "smallest_curvature", "mean_curvature"), "1/{}")
 LENGTHS |= {"density": "1/{}²", "mean_height": "{}", "height_std": "{}"}
 
