@@ -383,7 +383,7 @@ def _contact(
         seconds=time.perf_counter() - began,
         prescribed_load=None if problem.load is None else problem.load * force,
     )
-    # Pickles omit these two, so `levels_of` proves the loads of an unpickled contact again.
+    # Where `_top` is None, or a pickle omits these two, `levels_of` proves the loads again.
     contact.__dict__.update(_by=solver, _top=top)
     return contact
 

@@ -160,3 +160,16 @@ def test_a_solver_that_stops_says_what_where_and_what_to_try(influence: Any) -> 
     assert np.abs(error.iterate - contact.loads).max() < 0.01 * contact.loads.max()
     again = cr.press(scene, approach=PAPER_APPROACH, start=error.iterate)
     assert again.iterations < contact.iterations
+
+
+@pytest.mark.parametrize("tolerance", [0.0, 1e-6])
+def test_steps_are_too_few_only_if_the_residual_is_too_large(tolerance: float) -> None:
+    for most in range(1, 9):
+        hasty = cr.solvers.Newton(tolerance=tolerance, max_iterations=most)
+        try:
+            cr.press(rough(), approach=PAPER_APPROACH, solver=hasty, influence="lattice")
+        except cr.SolverError as error:
+            residual, needed = re.findall(r"residual (\S+) of .*at most (\S+) needed", error.what)[
+                0
+            ]
+            assert float(residual) > float(needed)

@@ -76,13 +76,14 @@ class Law(Protocol):
 def solve(
     law: Law, state: Iterate, accurate: float, tolerance: float, most: int, linear: float = 0.0
 ) -> tuple[Iterate, int]:
-    """The final state, and the number of steps. Raises SolverError after `most` steps.
+    """The final state, and the number of steps. Raises SolverError if `most` steps are too few.
 
     The method ends if  residual <= tolerance * scale.  Once  residual <= accurate * scale,  it also
     ends if the defect is below its `noise`, or if a step does not halve the residual; in this last
     case the better of the states before and after the step is returned. If the caller makes one
     linear correction, it gives the 2-norm `linear` of the defect that this may leave: the method
-    then also ends if the next step is expected to leave no more.
+    then also ends if the next step is expected to leave no more. After `most` steps the larger of
+    `tolerance` and `accurate` suffices.
     """
     before = np.inf  # the 2-norm of the last defect
     for step in range(1, most + 1):
@@ -102,6 +103,8 @@ def solve(
         if near and following.residual >= 0.5 * state.residual:
             return min(state, following, key=lambda each: each.residual), step
         state, before = following, size
+    if state.residual <= max(tolerance, accurate) * state.scale:
+        return state, most
     raise SolverError(
         f"residual {_relative(state):.3g} of {law.unit} after {most} steps, "
         f"at most {max(tolerance, accurate):.3g} needed",

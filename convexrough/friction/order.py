@@ -8,7 +8,7 @@ an inverse.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from fractions import Fraction
 from itertools import pairwise
 from typing import Literal, NamedTuple
@@ -59,8 +59,7 @@ def order_between(
     rising = ~top.open
     if len(used) == 1 or proved_between(top, at(used[-1]), rising, most):
         return "proved"
-    levels = [at(load) for load in used]
-    if _falls(levels, levels, rising):
+    if _falls(map(at, used), map(at, used), rising):  # levels are computed as they are needed
         return "fails"
     unproved = [(used[0], used[-1])]
     left = BETWEEN if rising.sum() <= INVERTED else FEW_BETWEEN
@@ -229,7 +228,7 @@ class _Span(NamedTuple):
         return np.where(sure.all(axis=1, keepdims=True), below, -np.inf)
 
 
-def _falls(steps: Sequence[Level], rated: Sequence[Level], rising: NDArray[np.bool_]) -> bool:
+def _falls(steps: Iterable[Level], rated: Iterable[Level], rising: NDArray[np.bool_]) -> bool:
     """True if a rate at the levels `rated` is negative, or if, from one of `steps` to the next
     lower one, an asperity is neither proved open there nor rising and proved to fall.
     """

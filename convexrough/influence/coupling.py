@@ -87,7 +87,7 @@ class Influence(Coupling):
     name: ClassVar[Kind]
     #: True if the matrix is stored; if False, products with float32 loads are cheaper.
     stored: ClassVar[bool] = False
-    #: True if `sums` takes only a few times as long as `apply`. Then Newton's method ends early,
+    #: True if `sums` takes only a few times as long as `apply`. Then Newton's method may end early,
     #: and `normal.refine` makes the last steps with `sums`.
     cheap_sums: ClassVar[bool] = False
 

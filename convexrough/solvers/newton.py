@@ -129,7 +129,7 @@ class Newton:
         Raises SolverError after `max_iterations`, and if no step lowers the energy.
         """
         loads, approach, iterations, trial = self._found(problem, start)
-        if trial is not None:  # the iteration has stopped early
+        if trial is not None:  # refinement is cheap
             trial = refined(problem, trial).frozen()
             approach, residual = float(trial.approach.value), float(trial.excess.max())
             return Solution(trial.loads.high, approach, iterations, residual, True, trial)
