@@ -50,6 +50,9 @@ FILLED = 0.2
 #: the asperities, are not cached.
 MOST_KEPT = 2**21
 
+#: Displacements at up to this number of other points are computed pair by pair. Affects speed only.
+FEW = 32
+
 #: 2 log 2, rounded down. The least value of the symbol (`lattice_symbol`), times scale / spacing,
 #: bounds the eigenvalues of A from below. It is -2 log 2 for a row of points, and at most this
 #: number for every lattice. The constant affects speed only.
@@ -200,7 +203,7 @@ class LatticeInfluence(coupling.Influence):
         return part
 
     def onto(self, points: Array) -> coupling.Coupling:
-        places = self.lattice.sites(points)
+        places = self.lattice.sites(points) if len(points) > FEW else None
         if places is None:
             return super().onto(points)
         together = np.concatenate((points, self.points))
@@ -213,9 +216,11 @@ class LatticeInfluence(coupling.Influence):
         box, places = self._boxed_for(loads)
         slices = self._on(box, "sliced pulls", lambda: self._slice_pulls(box))
         pulls = [pull.sums(Pair.exact(loads), places) for pull in slices]
-        # The vector d / |d|^3 changes by at most 2 / |d|^3 times a small change of d.
-        _, _, most, unknown = self._deviations
-        moved = 4.04 * (most + unknown) * self.lattice.spacing * self.falloff(np.abs(loads), 3)
+        moved: Array | float = 0.0
+        if not self.layout.exact:
+            # The vector d / |d|^3 changes by at most 2 / |d|^3 times a small change of d.
+            _, _, most, unknown = self._deviations
+            moved = 4.04 * (most + unknown) * self.lattice.spacing * self.falloff(np.abs(loads), 3)
         values = np.stack([pull.value for pull in pulls], axis=1)
         errors = np.stack([pull.error + moved for pull in pulls], axis=1)
         return Ball.around(-self.scale * values, self.scale * (errors + 8 * ROUNDOFF * abs(values)))
@@ -280,9 +285,11 @@ class LatticeInfluence(coupling.Influence):
         """
         slices = slices or self.slices
         box, places = self._boxed_for(np.asarray(loads.high))
-        off_sites = self._off_sites(np.asarray(loads.high), box, places)
-        sliced = self._on(box, slices, lambda: self._slice(box, slices))
-        return sliced.sums(loads, places) + off_sites
+        off_sites = None
+        if not self.layout.exact:
+            off_sites = self._off_sites(np.asarray(loads.high), box, places)
+        total = self._on(box, slices, lambda: self._slice(box, slices)).sums(loads, places)
+        return total if off_sites is None else total + off_sites
 
     def _on(self, box: SiteBox, name: object, make: Callable[[], Made]) -> Made:
         """The object on this box that `make` returns; threads can use other boxes meanwhile."""

@@ -62,6 +62,7 @@ class Layout(Cached):
     #: The lattice on which the points were made, and (n, 2) their sites; None for other points.
     made: tuple[Lattice, Sites] | None = None
     filled: float = 0.0  # [length] all sites of `made` nearer to the axis than this are points
+    exact: bool = False  # True if all points of `made` are at their sites, without rounding
 
     def __post_init__(self) -> None:
         if self.made is None and (len(self.points) <= MANY or self.lattice is None):
@@ -69,15 +70,26 @@ class Layout(Cached):
 
     @classmethod
     def of(cls, second: tuple[float, float], spacing: float, limit: float) -> Layout:
-        """The layout of `sites_within` this limit, for a spacing [length]."""
+        """The layout of `sites_within` this limit, for a spacing [length].
+
+        Of more than `MANY` points, all are exactly on their sites: the vectors of the lattice are
+        rounded to so few bits that the coordinates of sites are float64 numbers.
+        """
         sites, order, others = sites_within(second, limit)
         i, j = sites.T
-        points = frozen(spacing * np.stack((i + second[0] * j, second[1] * j), axis=1))
+        basis = spacing * np.array([[1.0, 0.0], second])
+        if exact := len(sites) > MANY:
+            # Coordinates become whole numbers of units below 2^53.
+            unit = 2.0 ** (np.ceil(np.log2(2.0 * np.abs(sites).max() * spacing)) - 53)
+            basis = np.rint(basis / unit) * unit
+            points = frozen(sites @ basis)
+        else:
+            points = frozen(spacing * np.stack((i + second[0] * j, second[1] * j), axis=1))
         if len(points) < 3:
             return cls(points)
         site_error = MADE_SITE_ERROR * float(np.abs(points).max())
-        lattice = Lattice(np.zeros(2), spacing * np.array([[1.0, 0.0], second]), site_error)
-        layout = cls(points, (lattice, sites), spacing * np.sqrt(others))
+        lattice = Lattice(np.zeros(2), basis, site_error)
+        layout = cls(points, (lattice, sites), spacing * np.sqrt(others), exact)
         layout.__dict__["order"] = order
         return layout
 

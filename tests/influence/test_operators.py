@@ -5,6 +5,7 @@ import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from fractions import Fraction
 from functools import partial
 from types import FrameType
 from typing import Any
@@ -13,7 +14,7 @@ import multiprecision
 import numpy as np
 import pytest
 from extended import inverse_sums, pulled
-from flint import arb, ctx
+from flint import arb, ctx, fmpq
 from point_layouts import BASES, LAYOUTS, lattice_patch, on_lattice, turned
 from scenes import paper
 
@@ -218,6 +219,35 @@ def test_slopes_on_lattices_that_are_made(family: str, most: float) -> None:
             off = [abs(float(arb(x) - y)) for x, y in zip(found[i], true, strict=True)]
             assert (np.array(off) <= errors[i]).all()
         assert errors.max() <= most * (A.scale * A.falloff(np.abs(load), 2)).max()
+
+
+@pytest.mark.parametrize("family", ["hexagonal", "square"])
+@pytest.mark.parametrize("geometry", ["summit", "closest"])
+def test_many_points_of_a_lattice_are_exactly_on_their_sites(family: str, geometry: Any) -> None:
+    spacing, rng = 0.1 / 7.0, np.random.default_rng(0)
+    make = partial(getattr(cr.Asperities, family), spacing=spacing, tip_radius=1.0)
+    array, fewer = make(within=45.5 * spacing), make(within=30.0 * spacing)
+    assert array.layout.exact
+    assert not fewer.layout.exact
+    assert np.abs(array.positions[: len(fewer)] - fewer.positions).max() < 1e-12 * spacing
+    layout, points = array.layout, [[Fraction(x) for x in p] for p in array.positions.tolist()]
+    basis = [[Fraction(x) for x in row] for row in layout.lattice.basis.tolist()]
+    for site, point in zip(layout.sites.tolist(), points, strict=True):
+        for k in (0, 1):
+            assert sum(n * row[k] for n, row in zip(site, basis, strict=True)) == point[k]
+    scene = cr.Scene(1e3, array, cr.Material(1.0, 0.3), geometry=geometry)
+    A = NormalProblem.assemble(scene, approach=1.0, influence="lattice").influence
+    loads, (along, across) = rng.random(len(A)), A.lattice.shrink
+    found, places = A.sums(Pair.exact(loads)), [points[i] for i in A.members]
+    with ctx.workprec(160):
+        for i in rng.integers(0, len(A), 2).tolist():
+            true = arb(0)
+            for load, (x, y) in zip(loads.tolist(), places, strict=True):
+                apart = (along * (x - places[i][0])) ** 2 + (across * (y - places[i][1])) ** 2
+                if apart:
+                    true += load * arb(fmpq(apart.numerator, apart.denominator)).rsqrt()
+            off = arb(found.mid.high[i]) + arb(found.mid.low[i]) - true
+            assert abs(float(off)) <= found.radius[i] <= 1e-21 * found.mid.high[i]
 
 
 @pytest.mark.parametrize("name", BASES)
