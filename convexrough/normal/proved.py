@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from convexrough.arithmetic.balls import Ball, elementwise, where
+from convexrough.arithmetic.balls import Ball, elementwise, of_rows, where
 from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, summed
 from convexrough.convex.theorem import distance
@@ -131,10 +131,18 @@ def _or_by_law(P: Pair, dP: Array, n: Pair, dn: Array, k: Pair, dk: Array) -> tu
 
     n : the indentations;  dP, dn, dk : radii of the balls
     """
-    ratio = Ball(n, dn) / Ball(k, dk)
+    # Where n is known well, the second ball has a radius of about 1.5 P dn / n.
+    hopeless = (n.high > 2.0 * dn) & (1.5 * P.high * dn > dP * n.high)
+    which = ((dP > POOR * P.high) & ~hopeless).nonzero()
+
+    def some(ball: Ball) -> Ball:
+        found: Ball = of_rows(lambda part: np.broadcast_to(part, dP.shape)[which], ball)
+        return found
+
+    ratio, found = some(Ball(n, dn)) / some(Ball(k, dk)), of_rows(np.copy, Ball(P, dP))
     by_law = ratio.positive_part() * ratio.sqrt()
-    better = (dP > POOR * P.high) & (by_law.radius < dP)
-    found = where(better, by_law, Ball(P, dP))
+    best = where(by_law.radius < dP[which], by_law, some(found))
+    found.mid.high[which], found.mid.low[which], found.radius[which] = *best.mid, best.radius
     return found.mid, found.radius
 
 
