@@ -32,9 +32,6 @@ from .friction.phases import phase_losses as phase_losses
 from .friction.shear import ShearCertificate as ShearCertificate
 from .friction.shear import ShearState as ShearState
 from .friction.shear import shear as shear
-from .friction.side_by_side import PathComparison as PathComparison
-from .friction.side_by_side import PathEntry as PathEntry
-from .friction.side_by_side import compare_paths as compare_paths
 from .friction.steady import cycle as cycle
 from .friction.steady import cycles as cycles
 from .friction.steady import steady as steady

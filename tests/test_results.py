@@ -68,8 +68,6 @@ def results() -> dict[str, Any]:
         cr.shakedown(scene, load=contact.load, force_amplitudes=[Q, -Q]),
         cr.phase_losses(scene, load=contact.load, load_amplitude=Q, force_amplitude=Q / 2,
                         phases=[0.0, 1.0], factors=[0.5, 1.0], chords=6),
-        cr.compare_paths(scene, loads=[contact.load] * 2, forces=[Q, -Q]),
-        cr.compare_paths(scene, loads=[contact.load], forces=[Q]).entries[0],
         cr.MemoryCurve.pressed(1.0).go(1.0, 0.25)[0],
         cycle.gradient(),
         cr.fretting(cycle),
@@ -98,8 +96,8 @@ def test_every_kind_is_here() -> None:
     assert public - settings - sweeps <= set(results())
     assert set(having("plot")) == {"Contact", "ShearState", "VectorShearState", "Cycle", "Fretting",
                           "Verdict", "Comparison", "LoadPath", "Shakedown",
-                          "MemoryCurve", "PhaseLosses", "PathComparison",
-                          "Gradient", "Surface", "Summits", "Provability"}  # fmt: skip
+                          "MemoryCurve", "PhaseLosses", "Gradient", "Surface", "Summits",
+                          "Provability"}  # fmt: skip
 
 
 def test_a_result_is_printed_on_one_screen_and_in_a_notebook() -> None:
@@ -169,7 +167,7 @@ def columns(result: Any) -> dict[str, np.ndarray[Any, Any]]:
 
 #: What a row of a table is, where it is no asperity.
 ROWS = {"Loop": "point", "Comparison": "entry", "LoadPath": "point",
-        "MemoryCurve": "vertex", "PhaseLosses": "ellipse", "PathComparison": "entry",
+        "MemoryCurve": "vertex", "PhaseLosses": "ellipse",
         "Provability": "level", "Contacts": "scene", "Cycles": "scene"}  # fmt: skip
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +16,7 @@ from convexrough import checks
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact, press
 from convexrough.errors import InputError
+from convexrough.friction.conic_step import ConicStepper
 from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.general_step import Stepper
 from convexrough.friction.levels import FrictionLevels, height_at, rounded
@@ -31,6 +32,9 @@ if TYPE_CHECKING:
 
 #: The smallest ratio of two positive loads of a path; smaller ratios could underflow in float64.
 LEAST_PART = 1e-250
+
+#: How general steps are solved, by the name of the solver.
+STEPPERS: dict[str, type[Stepper]] = {"newton": Stepper, "conic": ConicStepper}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -144,6 +148,7 @@ def load_path(
     start: Contact | None = None,
     influence: Kind | None = None,
     general_steps: int | None = None,
+    solver: Literal["newton", "conic"] = "newton",
 ) -> LoadPath:
     """The friction states along a path of load and shear force with straight segments.
 
@@ -156,6 +161,8 @@ def load_path(
     general_steps : number of general steps per segment (docs/theory/without-order.md), whose
         results are not proved. With None, the states come from the memory curve; if order fails and
         the normal solution of the contact is proved, from 16, 32 or 64 general steps per segment
+    solver    : method for general steps: "newton", or "conic" for a second-order cone program. With
+        one general step per segment, both give the path of the memory curve if order is proved
 
     Raises InputError for an empty path, negative loads, shear forces that exceed f P, a scene
     without friction, or a `start` of another scene; SolverError if a normal problem is not solved.
@@ -167,7 +174,10 @@ def load_path(
     """
     if general_steps is not None:
         checks.whole("general_steps", general_steps)
-    return path_of(*walk_of(scene, loads, forces, start, influence, general_steps))
+    if solver not in STEPPERS:
+        raise InputError("solver", found=solver, expected=f"one of {', '.join(STEPPERS)}")
+    stepper = STEPPERS[solver]
+    return path_of(*walk_of(scene, loads, forces, start, influence, general_steps, stepper))
 
 
 def history(contact: Contact, *, forces: ArrayLike) -> LoadPath:

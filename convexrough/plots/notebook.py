@@ -36,7 +36,6 @@ PICTURES = {
     "Gradient": "gradient.draw_gradient",
     "Verdict": "verdict.draw_claim",
     "Comparison": "verdict.draw_times",
-    "PathComparison": "verdict.draw_times",
     "Surface": "surface.draw_surface",
     "Summits": "surface.draw_summit_map",
     "Provability": "surface.draw_provability",
@@ -123,9 +122,9 @@ def plot(result: object, axes: Axes | None = None) -> Axes:
         Cycle: loop, or the plane of loads if the normal load varies; Fretting: map of slip
         amplitudes; LoadPath: shear force against displacement, or the plane of loads if the load
         varies; MemoryCurve: the plane of loads; Gradient: map of derivatives; Verdict: map of
-        proved statuses with marks on wrong claims; Comparison, PathComparison: times of the solvers
-        or methods; PhaseLosses: loss against phase; Shakedown: map of factors, or of slips for the
-        kind "vector"; Surface, Summits: map; Provability: contacts against pruning
+        proved statuses with marks on wrong claims; Comparison: times of the solvers;
+        PhaseLosses: loss against phase; Shakedown: map of factors, or of slips for the kind
+        "vector"; Surface, Summits: map; Provability: contacts against pruning
     axes   : matplotlib axes; default: those of a new figure, which notebooks and `pyplot.show` show
 
     Raises InputError for anything else.

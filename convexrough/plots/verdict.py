@@ -1,4 +1,4 @@
-"""Figures of a verdict, a map with marks on wrong claims, and of comparisons, which show times."""
+"""Figures of a verdict, a map with marks on wrong claims, and of a comparison, which show times."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from convexrough.compare import Comparison
-from convexrough.friction.side_by_side import PathComparison
 from convexrough.normal.claims import Claim
 from convexrough.plots import asperity_map as maps
 from convexrough.plots import style
@@ -63,11 +62,10 @@ def draw_claim(axes: Axes, claim: Claim) -> None:
     style.legend(axes, "below", handles=handles)
 
 
-def draw_times(axes: Axes, comparison: Comparison | PathComparison) -> None:
+def draw_times(axes: Axes, comparison: Comparison) -> None:
     """Draw a dot at the time of each entry; one without a result has its outcome as text."""
     columns = {name: values for name, (_, values) in comparison._variables().items()}
-    names = columns["way" if isinstance(comparison, PathComparison) else "solver"].tolist()
-    outcomes, seconds = columns["outcome"], columns["seconds"]
+    names, outcomes, seconds = (columns[name] for name in ("solver", "outcome", "seconds"))
     for place, (outcome, time) in enumerate(zip(outcomes, seconds, strict=True)):
         if outcome == "answered":
             axes.plot(time, place, "o", color=ROUGH, clip_on=False)

@@ -1,6 +1,7 @@
 """Ways along a load path: the memory curve, the general step, and the step as a cone program."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -84,39 +85,46 @@ def test_a_displacement_at_gross_sliding_or_just_below(given: dict[str, float]) 
         cr.shear(contact, displacement=1.001 * gross.displacement)
 
 
+def differs(path: cr.LoadPath, known: cr.LoadPath) -> float:
+    """The larger of the relative differences of shear forces and displacements."""
+    forces = np.abs(path.asperity_forces - known.asperity_forces).max()
+    moved = np.abs(path.displacements - known.displacements).max()
+    largest = 0.5 * known.asperity_loads.max(), np.abs(known.displacements).max()
+    return max(float(forces / largest[0]), float(moved / largest[1]))
+
+
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("points", [ONE, TWO])
 def test_three_ways_to_one_path(points: list[tuple[float, float]]) -> None:
     scene, P, Q = path_of("paper", points)
-    found = cr.compare_paths(scene, loads=P, forces=Q)
-    assert [each.way for each in found.entries] == ["general step", "memory curve", "conic step"]
-    assert [each.outcome for each in found.entries] == ["answered"] * 3
-    for each, most in zip(found.entries, (0.0, 1e-12, 1e-5), strict=True):
-        assert max(each.force_disagreement, each.displacement_disagreement) <= most
+    curve, step, conic = three_ways(scene, P, Q)
+    assert curve.order == "proved"
+    assert differs(step, curve) <= 1e-12
+    assert 0 < differs(conic, curve) <= 1e-5
 
 
 @settings(max_examples=4, deadline=None)
 @given(random_paths(0.2, 0.9))
 def test_random_paths_as_cone_programs(sampled: tuple[cr.Scene, Array, Array]) -> None:
-    scene, P, Q = sampled
-    conic = cr.compare_paths(scene, loads=P, forces=Q).entries[2]
-    assert conic.outcome == "answered" or "dense" in conic.message
-    if conic.outcome == "answered":
-        assert conic.force_disagreement < 1e-4
-        assert conic.displacement_disagreement < 1e-4
+    try:
+        _, step, conic = three_ways(*sampled)
+    except cr.SolverError as error:
+        if "dense" not in str(error):
+            raise
+        return
+    assert differs(conic, step) < 1e-4
 
 
-def test_without_order_the_curve_is_refused_and_the_steps_agree() -> None:
+def test_without_order_steps_as_cone_programs_agree() -> None:
     scene = shaded()
     largest = cr.press(scene, approach=1.0).load
     P, Q = np.array([0.8, 1.0]) * largest, 0.5 * np.array([0.2, 0.5]) * largest
-    found = cr.compare_paths(scene, loads=P, forces=Q)
-    assert found.order == "fails"
-    assert found.entries[1].outcome == "refused"
-    assert found.entries[1].path is None
-    conic = found.entries[2]
-    assert conic.outcome == "answered", conic.message
-    assert conic.force_disagreement < 1e-4
-    assert "refused: it is not proved that indentations rise" in repr(found)
-    assert np.isnan(found.to_xarray()["asperity_forces"][1]).all()
-    found.plot()
+    curve, step, conic = three_ways(scene, P, Q)
+    assert curve.order == "fails"
+    assert differs(conic, step) < 1e-4
+
+
+def three_ways(scene: cr.Scene, P: Array, Q: Array) -> tuple[cr.LoadPath, ...]:
+    """By the memory curve, a general step for each segment, and this step as a cone program."""
+    ways: list[Any] = [{}, {"general_steps": 1}, {"general_steps": 1, "solver": "conic"}]
+    return tuple(cr.load_path(scene, loads=P, forces=Q, **way) for way in ways)

@@ -62,6 +62,7 @@ BAD = [
     (lambda: follow([P], [0.0], start=cr.press(replace(PAPER, friction=0.4), load=P)),
      "another scene"),
     (lambda: follow([P], [0.0], general_steps=0), "steps"),
+    (lambda: follow([P], [0.0], solver="cone"), "one of newton, conic"),
     (lambda: follow([P, 1e-300 * P], [0.0, 0.0]), "largest"),
     (lambda: follow([1e-300 * P], [0.0], start=cr.press(PAPER, load=P)), "largest"),
     # Limits of shakedown.
