@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from fractions import Fraction
 from itertools import pairwise
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,8 +127,8 @@ def proved_in_rows(rows: Stack, box: Box, high: Rows, low: Rows) -> NDArray[np.b
     order = order[:, :known]
     entries = np.empty((*order.shape, count))
     for some, problem in rows.coupled:
-        which = order[some]
-        entries[some] = problem.influence.matrix[which[:, :, None], which[:, None, :count]]
+        for k in range(some.start, some.stop):
+            entries[k] = problem.influence.matrix.take(order[k], 0).take(order[k, :count], 1)
     return span.settled(rates, span.support, order, entries, entry_error)
 
 
@@ -200,32 +200,38 @@ class _Span(NamedTuple):
         entries     : (m, r, s) of A; columns are the s asperities, rows the same and r - s more
         entry_error : (m, 1) bound on the relative error of the entries
         """
-        c, s = self.c[:, :, None], np.arange(self.c.shape[1])
-        matrix = entries[:, s] * self.c[:, :, None]
-        matrix[:, s, s] = 1.0
+        c, count = self.c[:, :, None], self.c.shape[1]
+        some = np.s_[:, :count]  # the s asperities
+        matrix = entries[some] * self.c[:, :, None]
+        diagonals(matrix)[...] = 1.0
         X = np.linalg.inv(matrix)
         v = entries @ X
-        v[:, s] -= (v[:, s, s] / X[:, s, s])[:, :, None] * X
-        v[:, s, s] = 0.0
+        v[some] -= (diagonals(v) / diagonals(X))[:, :, None] * X
+        diagonals(v)[...] = 0.0
         left = v @ matrix  # t_k, then t_k - A_ik
-        own = np.maximum(left[:, s, s], 0.0) * self.c
+        own = np.maximum(diagonals(left), 0.0) * self.c
         left -= entries
-        left[:, s, s] = np.minimum(left[:, s, s], 0.0)
+        np.minimum(diagonals(left), 0.0, out=diagonals(left))
         rest = 1.0 - (v @ c)[:, :, 0]
-        lost = 1.01 * (entry_error + (len(s) + 16) * ROUNDOFF)
+        lost = 1.01 * (entry_error + (count + 16) * ROUNDOFF)
         rounding = np.abs(v) @ (matrix @ c) + entries @ c
         off = (np.abs(left) @ c)[:, :, 0] + 2.0 * lost * rounding[:, :, 0] + SAFETY
-        room, m = 1.0 - own - off[:, s], np.ones(self.c.shape)
+        room, m = 1.0 - own - off[some], np.ones(self.c.shape)
         positive = np.maximum(v, 0.0)
         for _ in range(IMPROVEMENTS):
             changed = (self._delta(m) * m)[:, :, None]
-            above = rest[:, s] + (positive[:, s] @ changed)[:, :, 0] + off[:, s]
+            above = rest[some] + (positive[some] @ changed)[:, :, 0] + off[some]
             m = np.where(room > 0, np.minimum(m, np.maximum(above, 0.0) / room), m)
         changed = (self._delta(m) * m)[:, :, None]
-        known = ~self.support | ((room > 0) & (np.abs(rest[:, s]) <= 2.0 * room))
+        known = ~self.support | ((room > 0) & (np.abs(rest[some]) <= 2.0 * room))
         below = rest - ((positive - v) @ changed)[:, :, 0] - 2.0 * off
-        sure = known & (~self.support | (below[:, s] > 0))
+        sure = known & (~self.support | (below[some] > 0))
         return np.where(sure.all(axis=1, keepdims=True), below, -np.inf)
+
+
+def diagonals(matrices: NDArray[Any]) -> NDArray[Any]:
+    """(m, s) the first s entries on the diagonals of matrices (m, r, s), as a view."""
+    return np.asarray(np.einsum("kii->ki", matrices[:, : matrices.shape[2]]))
 
 
 def _falls(steps: Iterable[Level], rated: Iterable[Level], rising: NDArray[np.bool_]) -> bool:
