@@ -15,11 +15,9 @@ import numpy as np
 from convexrough.arithmetic.balls import Ball, joined
 from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices, summed
+from convexrough.convex.newton_step import softness_of
 from convexrough.normal.exact import Data
 from convexrough.normal.problem import NormalProblem
-
-#: Slopes dP/d(delta) that count as 0, in scaled units: of open asperities.
-LEAST_SLOPE = 2.0**-500
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +108,7 @@ class Stack(NormalProblem):
 
         count = max(1, int((slopes > 0).sum(axis=1).max()))
         order = np.argsort(slopes <= 0, axis=1, kind="stable")[:, :count]
-        softness = 1.0 / np.maximum(np.take_along_axis(slopes, order, axis=1), LEAST_SLOPE)
+        softness = softness_of(np.take_along_axis(slopes, order, axis=1))
         right = np.ones((len(slopes), 2, count))
         right[:, 0] = np.take_along_axis(defect, order, axis=1)
         for rows, problem in self.coupled:
