@@ -16,6 +16,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough import threads
 from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, Indices
 from convexrough.convex.newton_step import correct
@@ -43,6 +44,9 @@ SWEPT, INVERTED, MOST = 400, 800, 20_000
 #: Largest number of intermediate levels of the bisection, with an inverse and without one; largest
 #: number of asperities of which an inverse bounds rates; number of times that (4) decreases m.
 BETWEEN, FEW_BETWEEN, MOST_BOUNDED, IMPROVEMENTS = 7, 1, 4 * INVERTED, 4
+
+#: Number of entries of matrices with which rates are computed together: they fit in a cache.
+TOGETHER = 2**16
 
 
 def order_between(
@@ -116,20 +120,22 @@ def proved_between(upper: Level, lower: Level, rising: NDArray[np.bool_], most: 
 def proved_in_rows(rows: Stack, box: Box, high: Rows, low: Rows) -> NDArray[np.bool_]:
     """(m,) `proved_between` for the levels in each row; `high` must have the path's top load."""
     span = _Span.of(high, low, rows.exact.coefficients, box)
-    entry_error = np.empty((len(span.c), 1))
-    for some, problem in rows.coupled:
-        entry_error[some] = problem.influence.entry_error
+    operators = [it.influence for some, it in rows.coupled for _ in range(some.start, some.stop)]
+    entry_error = np.array([[each.entry_error] for each in operators])
     lost = 1.01 * (entry_error + (span.c.shape[1] + 2) * ROUNDOFF)
     rates = 1.0 - rows.apply(span.c) * (1 + lost + SAFETY) - SAFETY
     left = span.support | span.unsettled(rates, span.support)
     order = np.argsort(~span.support * 1 + ~left, axis=1, kind="stable")
     known, count = (max(1, int(each.sum(axis=1).max())) for each in (left, span.support))
-    order = order[:, :known]
+    order, proved = order[:, :known], np.empty(len(order), dtype=bool)
     entries = np.empty((*order.shape, count))
-    for some, problem in rows.coupled:
-        for k in range(some.start, some.stop):
-            entries[k] = problem.influence.matrix.take(order[k], 0).take(order[k, :count], 1)
-    return span.settled(rates, span.support, order, entries, entry_error)
+    for own, A, it in zip(entries, operators, order, strict=True):
+        own[...] = A.matrix.take(it, 0).take(it[:count], 1)
+    for some in threads.chunks(len(order), max(1, TOGETHER // (known * count))):
+        part = _Span._make(each[some] for each in span)
+        given = rates[some], part.support, order[some], entries[some], entry_error[some]
+        proved[some] = part.settled(*given)
+    return proved
 
 
 class _Span(NamedTuple):
