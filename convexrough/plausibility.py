@@ -45,7 +45,7 @@ def limits(
     """Measures of the validity of the model, by name, for loads and contact radii (n,)."""
     touching, hardness, pressures = loads > 0, scene.material.hardness, mean_pressures(loads, radii)
     reaches = (
-        (np.linalg.norm(scene.contact_points[touching, axes], axis=1) + radii[touching]) / R
+        (np.linalg.norm(scene.contact_points[:, axes], axis=1) + radii)[touching] / R
         for R, axes in scene.curved
     )
     return {
@@ -156,9 +156,13 @@ def cautions(normal: Mapping[str, Any], scene: Scene, approach: float) -> Iterat
         )
 
 
-def cautions_about(scene: Scene, loads: Array, approach: float) -> list[str]:
-    """The warnings of `cautions` for loads (n,) [force] at an approach [length]."""
-    radii = discs_of(scene, loads)
+def cautions_about(
+    scene: Scene, loads: Array, approach: float, radii: Array | None = None
+) -> list[str]:
+    """The warnings of `cautions` for loads (n,) [force] at an approach [length], which may come
+    with the contact radii (n,) [length].
+    """
+    radii = discs_of(scene, loads) if radii is None else radii
     apart = scene.lattice is not None and 2 * radii.max() < 0.99 * scene.lattice.spacing
     near = 0.0 if apart else crowding(scene.contact_points, radii)
     found = limits(scene, loads, radii, near, covered(scene, radii), approach)
@@ -185,7 +189,7 @@ def rim_touching(scene: Scene, touching: NDArray[np.bool_], approach: float) -> 
     equal = np.ptp(asperities.heights) == 0 == np.ptp(asperities.tip_radii)
     if not is_array(scene) or (equal and scene.reach(approach) <= layout.filled * (1 + 1e-9)):
         return 0.0
-    return float(touching[layout.rim].mean())
+    return np.count_nonzero(touching[layout.rim]) / len(layout.rim)
 
 
 def ends(scene: Scene, touching: NDArray[np.bool_]) -> bool:

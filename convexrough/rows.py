@@ -29,7 +29,7 @@ from convexrough.roundoff import AT_THE_END, ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
 
 #: Rows are processed together up to this total number of entries of their matrices.
-MATRICES = 2**20
+MATRICES = 2**21
 
 #: Fields of `Contacts` (TOTALS) and of `Cycles` (CYCLE) with one number for each scene.
 TOTALS = ("loads", "load_errors", "approaches", "approach_errors")

@@ -63,10 +63,10 @@ class Ball:
 
     @classmethod
     @quietly
-    def around(cls, value: Exact, radius: Any) -> Ball:
+    def around(cls, value: float | Array | Pair, radius: Any) -> Ball:
         """Balls of numbers known to within this radius."""
-        ball = cls.exact(value)
-        return cls(*_finished(ball.mid, (ball.radius + radius) * UP + 0.0 * ball.mid.high))
+        pair = value if isinstance(value, Pair) else Pair.exact(value)
+        return cls(*_finished(pair, radius * UP + 0.0 * pair.high))
 
     @classmethod
     @quietly

@@ -10,7 +10,8 @@ If the loads must keep their sum, beta is the number for which sum W y = 0; othe
 matrix I + W A W is positive definite where the energy is convex. If it is not, diag(`shells`) is
 added to A. By the shell lemma (docs/theory/convexity.md) the sum is positive semidefinite, so I + W
 (A + diag(`shells`)) W is positive definite. Conjugate gradients also give A W y, from which the
-step d follows for every asperity, touching or open.
+step d follows for every asperity, touching or open. Factorised is diag(1 / c) + A, in which W y is
+the unknown.
 """
 
 from __future__ import annotations
@@ -36,6 +37,9 @@ SINGLE_LIMIT, DOUBLE_LIMIT = 2e-6, 1e-13
 ENERGY = 1e-2
 
 MOST_ITERATIONS = 500
+
+#: Smaller slopes dP/d(delta), in scaled units, count as 0.
+LEAST_SLOPE = 2.0**-500
 
 Values = NDArray[Any]  # of single or double precision
 
@@ -85,22 +89,24 @@ def _factorise(
     """The step by Cholesky's factorisation; None if the matrix is not positive definite."""
     from scipy.linalg.lapack import dpotrf, dpotrs  # 0.2 s to import: only when solving
 
-    w = root[touching]
-    matrix = influence.submatrix(touching)
-    matrix *= w
-    matrix *= w[:, None]
-    matrix.ravel()[:: len(w) + 1] = 1.0 if shells is None else 1.0 + w * shells[touching] * w
+    matrix, softness = influence.submatrix(touching), softness_of(root[touching] ** 2)
+    matrix.ravel()[:: len(matrix) + 1] = softness if shells is None else softness + shells[touching]
     # The symmetric matrix equals its transpose, which has LAPACK's order: no copy.
     factor, info = dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)
     if info != 0:
         return None
-    y = dpotrs(factor, w * defect[touching], lower=1, overwrite_b=1)[0]
+    x = dpotrs(factor, defect[touching], lower=1)[0]
     shift = 0.0
     if balanced:
-        border = dpotrs(factor, w, lower=1)[0]
-        shift = float(w @ y) / float(w @ border)
-        y -= shift * border
-    return shift - defect + influence.apply(among_zeros(w * y, touching, len(root)))
+        border = dpotrs(factor, np.ones(len(x)), lower=1, overwrite_b=1)[0]
+        shift = float(x.sum()) / float(border.sum())
+        x -= shift * border
+    return shift - defect + influence.apply(among_zeros(x, touching, len(root)))
+
+
+def softness_of(slopes: Array) -> Array:
+    """1 / c for slopes c = dP/d(delta); large but finite where c is 0."""
+    return np.asarray(1.0 / np.maximum(slopes, LEAST_SLOPE))
 
 
 def _iterate(

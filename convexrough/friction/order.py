@@ -11,11 +11,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from fractions import Fraction
 from itertools import pairwise
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough import threads
 from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, Indices
 from convexrough.convex.newton_step import correct
@@ -43,6 +44,9 @@ SWEPT, INVERTED, MOST = 400, 800, 20_000
 #: Largest number of intermediate levels of the bisection, with an inverse and without one; largest
 #: number of asperities of which an inverse bounds rates; number of times that (4) decreases m.
 BETWEEN, FEW_BETWEEN, MOST_BOUNDED, IMPROVEMENTS = 7, 1, 4 * INVERTED, 4
+
+#: Number of entries of matrices with which rates are computed together: they fit in a cache.
+TOGETHER = 2**16
 
 
 def order_between(
@@ -116,20 +120,22 @@ def proved_between(upper: Level, lower: Level, rising: NDArray[np.bool_], most: 
 def proved_in_rows(rows: Stack, box: Box, high: Rows, low: Rows) -> NDArray[np.bool_]:
     """(m,) `proved_between` for the levels in each row; `high` must have the path's top load."""
     span = _Span.of(high, low, rows.exact.coefficients, box)
-    entry_error = np.empty((len(span.c), 1))
-    for some, problem in rows.coupled:
-        entry_error[some] = problem.influence.entry_error
+    operators = [it.influence for some, it in rows.coupled for _ in range(some.start, some.stop)]
+    entry_error = np.array([[each.entry_error] for each in operators])
     lost = 1.01 * (entry_error + (span.c.shape[1] + 2) * ROUNDOFF)
     rates = 1.0 - rows.apply(span.c) * (1 + lost + SAFETY) - SAFETY
     left = span.support | span.unsettled(rates, span.support)
     order = np.argsort(~span.support * 1 + ~left, axis=1, kind="stable")
     known, count = (max(1, int(each.sum(axis=1).max())) for each in (left, span.support))
-    order = order[:, :known]
+    order, proved = order[:, :known], np.empty(len(order), dtype=bool)
     entries = np.empty((*order.shape, count))
-    for some, problem in rows.coupled:
-        which = order[some]
-        entries[some] = problem.influence.matrix[which[:, :, None], which[:, None, :count]]
-    return span.settled(rates, span.support, order, entries, entry_error)
+    for own, A, it in zip(entries, operators, order, strict=True):
+        own[...] = A.matrix.take(it, 0).take(it[:count], 1)
+    for some in threads.chunks(len(order), max(1, TOGETHER // (known * count))):
+        part = _Span._make(each[some] for each in span)
+        given = rates[some], part.support, order[some], entries[some], entry_error[some]
+        proved[some] = part.settled(*given)
+    return proved
 
 
 class _Span(NamedTuple):
@@ -200,32 +206,38 @@ class _Span(NamedTuple):
         entries     : (m, r, s) of A; columns are the s asperities, rows the same and r - s more
         entry_error : (m, 1) bound on the relative error of the entries
         """
-        c, s = self.c[:, :, None], np.arange(self.c.shape[1])
-        matrix = entries[:, s] * self.c[:, :, None]
-        matrix[:, s, s] = 1.0
+        c, count = self.c[:, :, None], self.c.shape[1]
+        some = np.s_[:, :count]  # the s asperities
+        matrix = entries[some] * self.c[:, :, None]
+        diagonals(matrix)[...] = 1.0
         X = np.linalg.inv(matrix)
         v = entries @ X
-        v[:, s] -= (v[:, s, s] / X[:, s, s])[:, :, None] * X
-        v[:, s, s] = 0.0
+        v[some] -= (diagonals(v) / diagonals(X))[:, :, None] * X
+        diagonals(v)[...] = 0.0
         left = v @ matrix  # t_k, then t_k - A_ik
-        own = np.maximum(left[:, s, s], 0.0) * self.c
+        own = np.maximum(diagonals(left), 0.0) * self.c
         left -= entries
-        left[:, s, s] = np.minimum(left[:, s, s], 0.0)
+        np.minimum(diagonals(left), 0.0, out=diagonals(left))
         rest = 1.0 - (v @ c)[:, :, 0]
-        lost = 1.01 * (entry_error + (len(s) + 16) * ROUNDOFF)
+        lost = 1.01 * (entry_error + (count + 16) * ROUNDOFF)
         rounding = np.abs(v) @ (matrix @ c) + entries @ c
         off = (np.abs(left) @ c)[:, :, 0] + 2.0 * lost * rounding[:, :, 0] + SAFETY
-        room, m = 1.0 - own - off[:, s], np.ones(self.c.shape)
+        room, m = 1.0 - own - off[some], np.ones(self.c.shape)
         positive = np.maximum(v, 0.0)
         for _ in range(IMPROVEMENTS):
             changed = (self._delta(m) * m)[:, :, None]
-            above = rest[:, s] + (positive[:, s] @ changed)[:, :, 0] + off[:, s]
+            above = rest[some] + (positive[some] @ changed)[:, :, 0] + off[some]
             m = np.where(room > 0, np.minimum(m, np.maximum(above, 0.0) / room), m)
         changed = (self._delta(m) * m)[:, :, None]
-        known = ~self.support | ((room > 0) & (np.abs(rest[:, s]) <= 2.0 * room))
+        known = ~self.support | ((room > 0) & (np.abs(rest[some]) <= 2.0 * room))
         below = rest - ((positive - v) @ changed)[:, :, 0] - 2.0 * off
-        sure = known & (~self.support | (below[:, s] > 0))
+        sure = known & (~self.support | (below[some] > 0))
         return np.where(sure.all(axis=1, keepdims=True), below, -np.inf)
+
+
+def diagonals(matrices: NDArray[Any]) -> NDArray[Any]:
+    """(m, s) the first s entries on the diagonals of matrices (m, r, s), as a view."""
+    return np.asarray(np.einsum("kii->ki", matrices[:, : matrices.shape[2]]))
 
 
 def _falls(steps: Iterable[Level], rated: Iterable[Level], rising: NDArray[np.bool_]) -> bool:

@@ -52,8 +52,8 @@ class SlicedMatrix:
     slices: tuple[Array, Array, Array]  # (m, n) the three parts
     blocks: list[tuple[slice, int]]  # columns, and the number of bits of first slices of loads
     exponent: int  # the matrix is that of points divided by 2^exponent; their extent is about 1
-    #: (3 blocks, m) three factors for each block, to be multiplied by its largest load, its largest
-    #: rest of a load after two slices, and its largest rest after one slice. The sum of these
+    #: (3 blocks, m) three factors for each block, to be multiplied by its largest rest of a load
+    #: after two slices, its largest rest after one slice, and its largest load. The sum of these
     #: products over all blocks bounds the error of a product with loads.
     losses: Array
 
@@ -75,7 +75,7 @@ class SlicedMatrix:
             for whole, part in zip(inverse, found, strict=True):
                 whole[some, columns] = part
                 if m == n:  # the matrix is symmetric
-                    whole[columns, some] = part.T
+                    whole[some.stop :, some] = part[:, len(part) :].T
 
         def cut(some: slice) -> None:
             for block, start in enumerate(starts):
@@ -101,11 +101,10 @@ class SlicedMatrix:
         with np.errstate(divide="ignore"):
             moved = np.where((moved < 1) & (nearest < LARGEST), moved / (1.0 - moved), np.inf)
         few = 4 * len(bits) + 12  # number of operations besides the sums in a block
-        ordinary = (min(BLOCK, n) + few) * ROUNDOFF * sizes
-        whole = ((few * ROUNDOFF) ** 2 + PAIR_ROUNDOFF + moved) * sizes.sum(axis=0)
-        losses = np.stack((ordinary[2] + whole, ordinary[0], ordinary[1]), axis=1)
+        losses = (min(BLOCK, n) + few) * ROUNDOFF * sizes
+        losses[2] += ((few * ROUNDOFF) ** 2 + PAIR_ROUNDOFF + moved) * sizes.sum(axis=0)
         blocks = [(slice(s, s + BLOCK), b) for s, b in zip(starts, bits, strict=True)]
-        return cls(slices, blocks, exponent, losses.reshape(-1, m) * UP)
+        return cls(slices, blocks, exponent, losses.swapaxes(0, 1).reshape(-1, m) * UP)
 
     def restricted(self, which: Indices) -> SlicedMatrix:
         """The matrix of the points with the increasing indices `which`; errors are not larger."""
@@ -134,7 +133,7 @@ class SlicedMatrix:
             left = left + tail
             sums += [first @ a, second @ a, first @ b]
             rests.append(left @ b + rest @ a + x @ c)
-            left_over += [most, _most(rest) + TINY, _most(left) + TINY]
+            left_over += [_most(rest) + TINY, _most(left) + TINY, most]
         high, low = sums[0], sum(rests)
         for exact in sums[1:]:
             high, error = two_sum(high, exact)

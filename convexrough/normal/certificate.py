@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
+from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.influence import Kind, couple
 from convexrough.normal.boxes import Box, Scope
@@ -197,8 +198,8 @@ def certificate_of(level: Level, loads: Array, start: Trial) -> Certificate:
     problem, box = level.problem, level.box
     length, force = problem.units.length, problem.units.force
     scaled, P = loads[problem.candidates] / force, start.loads.high  # tiny loads underflow
-    moved = _apart(P, level) + np.abs(start.loads.low)
-    shift = float((level.approach - start.approach.value).size)
+    moved = _apart(P, level.loads) + np.abs(start.loads.low)
+    shift = float(_apart(start.approach.value, level.approach))
     here = start is level.trial
     known = level.indentation if here else start.indentation
     others, below, beyond, errors_beyond = _screened(
@@ -231,7 +232,7 @@ def certificate_of(level: Level, loads: Array, start: Trial) -> Certificate:
     load_errors = loads.copy()  # the bound for an asperity that cannot touch
     load_errors[problem.candidates] -= scaled * force
     np.abs(load_errors, out=load_errors)
-    load_errors[problem.candidates] += _apart(scaled, level) * force
+    load_errors[problem.candidates] += _apart(scaled, level.loads) * force
     errors = problem.to_scene(
         level.indentation.error if here else (level.indentation - known.value).size
     )
@@ -258,9 +259,9 @@ def certificate_of(level: Level, loads: Array, start: Trial) -> Certificate:
     )
 
 
-def _apart(loads: Array, found: Level) -> Array:
-    """(n,) bounds on |load - load in the solution|, in scaled units, where asperities can touch."""
-    return np.asarray(np.abs(loads - found.loads.value) * (1 + SAFETY) + found.loads.error)
+def _apart(values: Array, found: Ball) -> Array:
+    """(n,) bounds on the distances of `values` from the numbers of the balls `found`."""
+    return np.asarray(np.abs(values - found.value) * (1 + SAFETY) + found.error)
 
 
 def _energy_error(found: Level, box: Box, start: Trial, moved: Array) -> float:

@@ -16,7 +16,7 @@ import numpy as np
 
 from convexrough import checks
 from convexrough.arithmetic.balls import Ball
-from convexrough.arithmetic.pairs import Pair, in_parts, square_sum, two_sum
+from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair, in_parts, square_sum, two_sum
 from convexrough.arrays import Array, Indices, taken
 from convexrough.errors import InputError
 from convexrough.scene.base import Radius, along
@@ -113,8 +113,14 @@ def _constants(base: Radius, modulus: float, local: float, unit: float) -> tuple
 
 
 def _coefficients(tips: Array, *constants: Any) -> Ball:
+    """(n,) the coefficients k of these tip radii.
+
+    The numbers are positive, and two are rounded. So the cube has a relative error of at most four
+    PAIR_ROUNDOFF, of which the root has a third, and the root is rounded once more.
+    """
     curvature, cubed, _ = _constants(*constants)
-    return ((1.0 / Ball.exact(tips) + curvature) * cubed).cbrt()
+    k = ((Pair.exact(1.0) / Pair.exact(tips) + curvature.mid) * cubed.mid).cbrt()
+    return Ball.around(k, 3.0 * PAIR_ROUNDOFF * k.high)
 
 
 @lru_cache

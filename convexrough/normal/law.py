@@ -77,7 +77,7 @@ def on_hertz_pressure(problem: NormalProblem) -> Array:
     inside = 1.0 - problem.squares / (WIDER * smooth_reach(problem))
     s = np.sqrt(np.fmax(inside, 0.0)) + 0.0 * (prescribed + problem.control.value)
     poor = ~(summed(s if load is not None else s * prescribed) > 0)
-    if np.any(poor):
+    if poor.any():
         highest = prescribed == prescribed.max(axis=-1, keepdims=True)
         s = np.where(poor, 1.0 * highest, s)
     displacement, own = problem.apply(s), problem.coefficients * np.cbrt(s) ** 2

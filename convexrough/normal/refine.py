@@ -201,7 +201,7 @@ def completed(problem: NormalProblem, loads: Pair, *, roughly: bool = False) -> 
     roughly : True to skip the scaling if the difference is less than FITS times the largest load
     """
     if problem.load is None:
-        return loads, Ball.exact(np.zeros_like(summed(loads.high)))
+        return loads, Ball.exact(np.zeros(problem.control.shape))
     if not loads.high.any():
         return loads, problem.control
     completed, n = Pair(*(part.copy() for part in loads)), loads.high.shape[-1]

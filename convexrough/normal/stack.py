@@ -14,7 +14,8 @@ import numpy as np
 
 from convexrough.arithmetic.balls import Ball, joined
 from convexrough.arithmetic.pairs import Pair
-from convexrough.arrays import Array, Indices
+from convexrough.arrays import Array, Indices, summed
+from convexrough.convex.newton_step import softness_of
 from convexrough.normal.exact import Data
 from convexrough.normal.problem import NormalProblem
 
@@ -99,30 +100,26 @@ class Stack(NormalProblem):
     def correct(self, slopes: Array, defect: Array, enough: Any = 0.0, todo: Any = True) -> Array:
         """(m, n) as `NormalProblem.correct`, to rounding; nan in rows whose matrix is indefinite.
 
+        The step is beta - F + A x, where (1 / slopes + A) x = F - beta.
+
         todo : (m,) True for rows that need a step; the step of all other rows is 0
         """
         from scipy.linalg.lapack import dposv  # takes 0.2 s to import
 
-        root = np.sqrt(slopes)
-        count = max(1, int((root > 0).sum(axis=1).max()))
-        order = np.argsort(root <= 0, axis=1, kind="stable")[:, :count]
-        w = np.take_along_axis(root, order, axis=1)
-        right = w * np.take_along_axis(defect, order, axis=1)
-        changes, shift = np.zeros(root.shape), np.zeros((len(root), 1))
+        count = max(1, int((slopes > 0).sum(axis=1).max()))
+        order = np.argsort(slopes <= 0, axis=1, kind="stable")[:, :count]
+        softness = softness_of(np.take_along_axis(slopes, order, axis=1))
+        right = np.ones((len(slopes), 2, count))
+        right[:, 0] = np.take_along_axis(defect, order, axis=1)
         for rows, problem in self.coupled:
             A = problem.influence.matrix
             for k in range(rows.start, rows.stop):
-                if not todo[k]:
-                    continue
-                matrix = A.take(order[k], 0).take(order[k], 1)
-                matrix *= w[k]
-                matrix *= w[k][:, None]
-                matrix.ravel()[:: count + 1] = 1.0
-                _, y, info = dposv(matrix.T, np.array((right[k], w[k])).T, lower=1, overwrite_a=1)
-                if info != 0:
-                    shift[k] = np.nan
-                    continue
-                if self.by_load:
-                    shift[k] = w[k] @ y[:, 0] / (w[k] @ y[:, 1])
-                changes[k, order[k]] = w[k] * (y[:, 0] - shift[k] * y[:, 1])
+                if todo[k]:
+                    matrix = A.take(order[k], 0).take(order[k], 1)
+                    matrix.ravel()[:: count + 1] = softness[k]
+                    _, x, info = dposv(matrix.T, right[k].T, lower=1, overwrite_a=1)
+                    right[k] = x.T if info == 0 else np.nan
+        changes, (moved, border) = np.zeros(slopes.shape), right.transpose(1, 0, 2)
+        shift = summed(moved) / summed(border) if self.by_load else 0.0
+        np.put_along_axis(changes, order, moved - shift * border, axis=1)
         return np.asarray(np.where(todo[:, None], shift - defect + self.apply(changes), 0.0))

@@ -140,7 +140,7 @@ def read_scene(path: str | os.PathLike[str], *, asperities: Asperities | None = 
 
         if isinstance(asperities, Summits):
             _one_unit(path, asperities.origin.unit, study.units.names.length)
-    task = task_of(path, study, asperities=asperities)
+    task = tasks_of(path, study, asperities=asperities)(None)
     layout, sources = study.asperities, [path]
     if layout.pattern == "file" and asperities is None:
         sources.append(path.parent / layout.path)
@@ -222,53 +222,56 @@ def regular(pattern: str, spacing: float, tip_radius: Any, within: float) -> Asp
     return make(spacing=spacing, tip_radius=tip_radius, within=within)
 
 
-def task_of(
+def tasks_of(
     path: Path,
     study: Study,
     *,
     asperities: Asperities | None = None,
     summits: Callable[..., Asperities] = read_summits,
     lattice: Callable[..., Asperities] = regular,
-) -> Task:
-    """The scene and the stages described by the checked tables of the scene file at `path`.
+) -> Callable[[int | None], Task]:
+    """A function that returns the scene and the stages described by the checked tables of the scene
+    file at `path`, for a seed of asperities in a pattern; for None, with the seed of the tables.
 
     asperities : asperities that replace those of the tables
     summits, lattice : functions like `read_summits` and `regular`, which make the asperities
 
-    Raises InputError for mistakes that the tables alone do not show.
+    Raises InputError, as the function does, for mistakes that the tables alone do not show.
     """
-    layout, units, highest = study.asperities, study.units, None
+    layout, units = study.asperities, study.units
     with blamed_on(path, "material", unless_known=True):
         stuff = study.material.made()
     how: Any = {"friction": study.friction.coefficient if study.friction else None}
     how |= {"geometry": layout.geometry, "units": units.names}
 
+    given: Any = {"approach": study.normal.approach, "load": study.normal.load}
+    given |= {"stages": study.stages, "solver": named(study.solver.name)}
+    given |= {"influence": study.solver.influence}
+
     def press_on(asperities: Asperities) -> Scene:
         return Scene(checked(study.sphere.radius), asperities, stuff, **how)
 
-    with blamed_on(path, "asperities", unless_known=True):
-        if asperities is not None:
-            scene = press_on(asperities)
-        elif layout.pattern == "file":
-            columns = named_columns("columns", layout.columns, SUMMIT_COLUMNS)
-            manner = Reading(columns=columns, units=units.names, convert=units.convert)
-            place = path.parent / layout.path
-            scene = press_on(summits(place, tip_radius=layout.tip_radius, how=manner))
-        else:
-            scene, highest = _lattice(layout, study, press_on, lattice)
-    return Task(
-        scene=scene,
-        approach=study.normal.approach,
-        load=study.normal.load,
-        highest_approach=highest,
-        stages=study.stages,
-        solver=named(study.solver.name),
-        influence=study.solver.influence,
-    )
+    def task(seed: int | None) -> Task:
+        highest = None
+        with blamed_on(path, "asperities", unless_known=True):
+            if asperities is not None:
+                scene = press_on(asperities)
+            elif layout.pattern == "file":
+                columns = named_columns("columns", layout.columns, SUMMIT_COLUMNS)
+                manner = Reading(columns=columns, units=units.names, convert=units.convert)
+                place = path.parent / layout.path
+                scene = press_on(summits(place, tip_radius=layout.tip_radius, how=manner))
+            else:
+                own = layout.seed if seed is None else seed
+                scene, highest = _lattice(layout, own, study, press_on, lattice)
+        return Task(scene=scene, highest_approach=highest, **given)
+
+    return task
 
 
 def _lattice(
     layout: LatticeTable,
+    seed: int | None,
     study: Study,
     press_on: Callable[[Asperities], Scene],
     lattice: Callable[..., Asperities],
@@ -279,7 +282,7 @@ def _lattice(
     load in [normal], or at the largest load in another table.
     """
     tips, deviation, variation = layout.tip_radius, layout.height_std, layout.tip_radius_cv
-    rough: Any = {"height_std": deviation, "tip_radius_cv": variation, "seed": layout.seed}
+    rough: Any = {"height_std": deviation, "tip_radius_cv": variation, "seed": seed}
     tip_radius = tuple(tips) if isinstance(tips, list) else tips
 
     def scene(within: float) -> Scene:

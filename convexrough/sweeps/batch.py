@@ -13,9 +13,9 @@ import scipy
 
 from convexrough.errors import SceneFileError
 from convexrough.run.asperity_file import read_summits
-from convexrough.run.scene_file import Task, regular, task_of
+from convexrough.run.scene_file import Task, regular, tasks_of
 from convexrough.run.stage import Columns as Columns
-from convexrough.run.study import LatticeTable, Study, validate
+from convexrough.run.study import validate
 from convexrough.sweeps.grid import Grid, table_in, with_values
 from convexrough.sweeps.measures import FAILURES, Column, Measured, measured, measured_together
 from convexrough.threads import one_thread
@@ -64,21 +64,17 @@ class Tables:
         summits, lattice = lru_cache(KEPT)(read_summits), lru_cache(KEPT)(regular)
 
         @lru_cache(1)
-        def checked(number: int) -> Study:
+        def checked(number: int) -> Callable[[int | None], Task]:
             values, seed = self.grid.point(number)
             study, mistakes = validate(with_values(self.tables, values, seed))
             if study is None:
                 raise SceneFileError(str(self.path), self.grid.blame(mistakes, seed))
-            return study
+            return tasks_of(self.path, study, summits=summits, lattice=lattice)
 
         def task(number: int) -> Task:
             """Scenes that differ only in the seed of heights and tip radii share one check."""
-            study = checked(number if self.grid.draw else number - number % self.grid.each)
-            _, seed = self.grid.point(number)
-            if seed is not None and isinstance(study.asperities, LatticeTable):
-                layout = study.asperities.model_copy(update={"seed": seed})
-                study = study.model_copy(update={"asperities": layout})
-            return task_of(self.path, study, summits=summits, lattice=lattice)
+            made = checked(number if self.grid.draw else number - number % self.grid.each)
+            return made(self.grid.point(number)[1])
 
         return task
 

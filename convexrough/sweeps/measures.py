@@ -18,7 +18,7 @@ import numpy as np
 
 from convexrough import checks
 from convexrough.arrays import Array
-from convexrough.contact import Contact, discs_of, total_area
+from convexrough.contact import Contact
 from convexrough.errors import ConvexroughError, InputError
 from convexrough.friction.onset import onset_of_sliding
 from convexrough.plausibility import cautions_about, cautions_of
@@ -28,7 +28,7 @@ from convexrough.run.scene_file import Task
 from convexrough.run.stage import STATUSES, Stage, limit, unit_of
 from convexrough.run.stages import CycleStage
 from convexrough.scene.scene import Scene
-from convexrough.sphere import mindlin
+from convexrough.sphere import hertz, mindlin
 from convexrough.sphere.smooth import smooth_reference
 from convexrough.tabular.units import UnitNames
 
@@ -182,9 +182,11 @@ def _known(
 ) -> dict[int, Measured]:
     """The numbers of those rows in which everything is proved, by the number of the row."""
     contacts = rows.contacts()
-    discs = map(discs_of, scenes, contacts["asperity_loads"])
+    modulus = scenes[0].material.contact_modulus  # of all rows of a stack
+    tips = np.array([scene.relative_radii for scene in scenes])
+    discs = hertz.contact_radius(contacts["asperity_loads"], modulus, tips)
     contacts |= {
-        "area": np.array([*map(total_area, discs)]),
+        "area": np.pi * (discs**2).sum(axis=1),
         "largest_load": contacts["asperity_loads"].max(axis=1),
         "certificate.load_error": contacts["asperity_load_errors"].max(axis=1),
     }
@@ -210,12 +212,11 @@ def _known(
                 "loss_over_smooth": loss / scales / smooth,
             }
             values |= _in_summary("cycle", row_label((low, high)), CYCLE, cycles)
-    found = {}
+    found, numbers = {}, np.array([*values.values()], dtype=np.float64).T.tolist()
     for k in np.flatnonzero(good).tolist():
-        numbers = {name: float(each[k]) for name, each in values.items()}
-        pressed = contacts["asperity_loads"][k], float(contacts["approaches"][k])
+        pressed = contacts["asperity_loads"][k], float(contacts["approaches"][k]), discs[k]
         warned = "; ".join(cautions_about(scenes[k], *pressed))
-        found[k] = Measured(numbers, "", warned)
+        found[k] = Measured(dict(zip(values, numbers[k], strict=True)), "", warned)
     return found
 
 
