@@ -34,6 +34,9 @@ ENTRY_ROUNDOFFS = 8
 #: entries; for larger matrices a cache saves no time.
 KEPT = 2**16
 
+#: Number of entries of a matrix that are computed at once; they fit in a processor's cache.
+ENTRIES = 2**15
+
 #: Ways to compute the operator: a matrix, transforms on a lattice, transforms on a mesh.
 Kind = Literal["dense", "lattice", "scattered"]
 
@@ -191,28 +194,30 @@ class DirectCoupling(Coupling):
         return self._sums(strengths, power) * (1.0 + 1.01 * loss)
 
     def _sums(self, values: Array, power: int) -> Array:
-        total = np.empty(len(self.targets))
-        for block, inverse in self._blocks():
-            total[block] = (inverse if power == 1 else inverse**power) @ values
+        total = np.zeros(len(self.targets))
+        for rows, columns, inverse in self._blocks():
+            total[rows] += (inverse if power == 1 else inverse**power) @ values[columns]
         return total
 
     @cached_property
     def _whole(self) -> Array:
         return inverse_distances(self.targets, self.points)
 
-    def _blocks(self) -> Iterator[tuple[slice, Array]]:
-        """Blocks of rows of the matrix 1 / r, each with its slice; a small matrix is one block."""
+    def _blocks(self) -> Iterator[tuple[slice, slice, Array]]:
+        """Blocks of the matrix 1 / r with their rows and columns; a small matrix is one block."""
         if len(self.points) * len(self.targets) <= KEPT:
-            yield slice(None), self._whole
+            yield slice(None), slice(None), self._whole
             return
-        for block in _rows(len(self.targets), len(self.points)):
-            yield block, inverse_distances(self.targets[block], self.points)
+        for rows in _rows(len(self.targets), len(self.points)):
+            for columns in threads.chunks(len(self.points), ENTRIES):
+                inverse = inverse_distances(self.targets[rows], self.points[columns])
+                yield rows, columns, inverse
 
     @cached_property
     def _entry_error(self) -> float:
         if self.point_error == 0:
             return entry_error(0.0, np.inf)
-        largest = [float(inverse.max(initial=0.0)) for _, inverse in self._blocks()]
+        largest = [float(inverse.max(initial=0.0)) for _, _, inverse in self._blocks()]
         closest = max(largest, default=0.0)
         return entry_error(self.point_error, 1.0 / closest if closest > 0 else np.inf)
 
@@ -272,8 +277,8 @@ def entry_error(point_error: float, nearest: float) -> float:
 
 
 def _rows(count: int, columns: int) -> Iterator[slice]:
-    """Slices of the rows of a matrix, of about 2^15 entries each, which fit in the cache."""
-    return threads.chunks(count, max(1, 2**15 // max(1, columns)))
+    """Slices of the rows of a matrix, of about `ENTRIES` entries each."""
+    return threads.chunks(count, max(1, ENTRIES // max(1, columns)))
 
 
 def squared_distances(points: Array, others: Array) -> Array:

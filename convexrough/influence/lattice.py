@@ -179,7 +179,7 @@ class LatticeInfluence(coupling.Influence):
 
     @property
     def points(self) -> Array:  # type: ignore[override]
-        return self.array[self.members]
+        return self.array.take(self.members, axis=0)  # several times faster than by an index
 
     def submatrix(self, which: Indices) -> Array:
         return coupling.dense_matrix(self.array[self.members[which]], self.scale)
