@@ -49,7 +49,8 @@ class ConicStepper(Stepper):
         wells = shells(self.influence.restricted(which))
         shifts = wells * N * parts / own  # `wells` in the units of the pieces
         if 1.5 * shifts.max(initial=0.0) > FIVE_CONES_LIMIT:
-            raise SolverError("too dense for a convex program", solver="conic step")
+            what, advice = "asperities too dense for a convex program", 'use solver="newton"'
+            raise SolverError(what, solver="conic step", advice=advice)
         energies = N * own / parts  # the factors that turn scaled energies W into W_i / p_i
         unit = float(energies.max())
 

@@ -161,11 +161,12 @@ def load_path(
     general_steps : number of general steps per segment (docs/theory/without-order.md), whose
         results are not proved. With None, the states come from the memory curve; if order fails and
         the normal solution of the contact is proved, from 16, 32 or 64 general steps per segment
-    solver    : method for general steps: "newton", or "conic" for a second-order cone program. With
-        one general step per segment, both give the path of the memory curve if order is proved
+    solver    : method for general steps, if there are any: "newton", or "conic" for a second-order
+        cone program. If order is proved, one step per segment gives the path of the memory curve
 
     Raises InputError for an empty path, negative loads, shear forces that exceed f P, a scene
-    without friction, or a `start` of another scene; SolverError if a normal problem is not solved.
+    without friction, or a `start` of another scene; SolverError if a normal problem or a general
+    step is not solved, or if asperities are too dense for a cone program.
 
     >>> P = contact.load
     >>> path = cr.load_path(scene, loads=[P / 2, P, P / 2], forces=[0.0, 0.3 * P, 0.1 * P])
@@ -174,8 +175,8 @@ def load_path(
     """
     if general_steps is not None:
         checks.whole("general_steps", general_steps)
-    if solver not in STEPPERS:
-        raise InputError("solver", found=solver, expected=f"one of {', '.join(STEPPERS)}")
+    if not isinstance(solver, str) or solver not in STEPPERS:
+        raise InputError("solver", found=repr(solver), expected=f"one of {', '.join(STEPPERS)}")
     stepper = STEPPERS[solver]
     return path_of(*walk_of(scene, loads, forces, start, influence, general_steps, stepper))
 

@@ -34,7 +34,7 @@ MOST = 512
 STEPS = 30
 
 #: Newton's method ends if the residual is below this fraction of the norm of the indentations. Then
-#: one step of refinement, which costs more, leaves little more than rounding errors. A heuristic.
+#: one step of refinement leaves little more than rounding errors. A heuristic.
 NEGLIGIBLE = 88 * ROUNDOFF
 
 #: Largest number of entries of an array (rows, asperities). Dozens of such arrays are in use at

@@ -131,7 +131,7 @@ def _or_by_law(P: Pair, dP: Array, n: Pair, dn: Array, k: Pair, dk: Array) -> tu
 
     n : the indentations;  dP, dn, dk : radii of the balls
     """
-    # Where n is known well, the second ball has a radius of about 1.5 P dn / n.
+    # Where n is known well, the ball of (n / k)^(3/2) has a radius of about 1.5 P dn / n.
     hopeless = (n.high > 2.0 * dn) & (1.5 * P.high * dn > dP * n.high)
     which = ((dP > POOR * P.high) & ~hopeless).nonzero()
 

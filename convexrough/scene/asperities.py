@@ -148,7 +148,7 @@ class Asperities(Record):
         Random heights, and logarithms of random tip radii, are clipped at 6 standard deviations.
         Asperities are ordered by distance from the axis, then by angle. A larger `within` appends
         asperities; the others keep their random heights and random tip radii. If there are more
-        than 5000 asperities, the spacing is changed by less than 1e-12 of it, so that coordinates
+        than 5000 asperities, the spacing is changed by less than 1e-11 of it, so that coordinates
         are exact.
 
         Raises InputError for bad values, and for more asperities than fit in memory.

@@ -61,7 +61,8 @@ class Layout(Cached):
     points: Array
     #: The lattice on which the points were made, and (n, 2) their sites; None for other points.
     made: tuple[Lattice, Sites] | None = None
-    filled: float = 0.0  # [length] all sites of `made` nearer to the axis than this are points
+    #: [length] all sites of `made` that are nearer to the axis than this are points, up to rounding
+    filled: float = 0.0
     exact: bool = False  # True if all points of `made` are at their sites, without rounding
 
     def __post_init__(self) -> None:

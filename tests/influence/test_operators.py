@@ -24,7 +24,7 @@ from convexrough.arithmetic.pairs import Pair, two_product
 from convexrough.arrays import Array
 from convexrough.bench.scenes import APPROACH
 from convexrough.bench.scenes import scene as bench_scene
-from convexrough.influence import lattice
+from convexrough.influence import coupling, lattice
 from convexrough.influence.coupling import Coupling, Influence, JointCoupling, inverse_distances
 from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.lattice import LatticeInfluence
@@ -127,15 +127,15 @@ def test_parts_and_other_points(kind: str, layout: str, seed: int, count: int) -
     if kind == "scattered":
         together = ScatteredInfluence(np.concatenate((mixed, part.points)), SCALE)
         couplings.append((JointCoupling(together, len(mixed)), mixed))
-    for coupling, points in couplings:
+    for onto, points in couplings:
         true, rest = inverse_sums(points, part.points, loads, SCALE)
-        product = coupling.apply(loads)
+        product = onto.apply(loads)
         error = np.abs(product - true - rest)
-        assert (error <= coupling.rounding(loads).of(product) * (1 + 1e-12)).all()
+        assert (error <= onto.rounding(loads).of(product) * (1 + 1e-12)).all()
         assert error.max(initial=0.0) <= 1e-9 * true.max(initial=0.0)
         for power in (2, 3):
             exactly, _ = inverse_sums(points, part.points, loads, power=power)
-            assert (coupling.falloff(loads, power) >= exactly).all()
+            assert (onto.falloff(loads, power) >= exactly).all()
 
 
 def at_line(k: int, call: Callable[[], Any], other: Callable[[], Any]) -> tuple[Any, bool]:
@@ -219,6 +219,17 @@ def test_slopes_on_lattices_that_are_made(family: str, most: float) -> None:
             off = [abs(float(arb(x) - y)) for x, y in zip(found[i], true, strict=True)]
             assert (np.array(off) <= errors[i]).all()
         assert errors.max() <= most * (A.scale * A.falloff(np.abs(load), 2)).max()
+
+
+def test_direct_sums_over_blocks_of_columns(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(coupling, "KEPT", 0)
+    monkeypatch.setattr(coupling, "ENTRIES", 16)
+    rng = np.random.default_rng(0)
+    points, targets, loads = rng.random((50, 2)), rng.random((7, 2)), rng.random(50)
+    direct = coupling.DirectCoupling(points, targets, SCALE, 0.0)
+    high, low = inverse_sums(targets, points, loads, SCALE)
+    off = np.abs((direct.apply(loads) - high) - low)
+    assert (off <= direct.rounding(loads).of(high)).all()
 
 
 @pytest.mark.parametrize("family", ["hexagonal", "square"])

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from flint import arb, ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
@@ -147,3 +148,22 @@ def test_bounds_cover_all_loads_within_an_uncertain_total() -> None:
     for name in ("loads", "indentation", "approach"):
         moved = np.abs((getattr(higher, name) - getattr(wide, name)).value)
         assert (moved <= getattr(wide, name).radius).all(), name
+
+
+@pytest.mark.parametrize("radii", [(1.0, 1.0), (0.7, 3e5), (np.inf, np.inf)])
+def test_coefficients_are_within_their_bounds_of_k(radii: tuple[float, float]) -> None:
+    """k^3 = 9 (1 / R + 1 / rho) / (16 E*^2), with the mean curvature 1 / R of the base."""
+    rng, modulus = np.random.default_rng(0), 1.0 / 3.0
+    tips = 10.0 ** rng.uniform(-20.0, 20.0, 500)
+    points = 1e-3 * np.indices((25, 20)).reshape(2, -1).T
+    scene = cr.Scene(radii, cr.Asperities(points, tips), cr.Material(modulus, 0.3), None, "summit")
+    problem = NormalProblem.assemble(scene, approach=1.0)
+    found = problem.exact.coefficients
+    with ctx.workprec(300):
+        base = sum((1 / (2 * arb(R)) for R in radii if np.inf > R), arb(0))
+        for i, tip in enumerate(tips[problem.candidates].tolist()):
+            cubed = arb(9) / 16 * (base + 1 / arb(tip)) / arb(modulus) ** 2
+            true = cubed.root(3) * arb(problem.units.local)
+            off = arb(found.mid.high[i]) + arb(found.mid.low[i]) - true
+            assert abs(float(off)) <= found.radius[i] <= 1e-29 * found.mid.high[i]
+            assert found.radius[i] > 0
