@@ -10,8 +10,8 @@ If the loads must keep their sum, beta is the number for which sum W y = 0; othe
 matrix I + W A W is positive definite where the energy is convex. If it is not, diag(`shells`) is
 added to A. By the shell lemma (docs/theory/convexity.md) the sum is positive semidefinite, so I + W
 (A + diag(`shells`)) W is positive definite. Conjugate gradients also give A W y, from which the
-step d follows for every asperity, touching or open. Factorised is diag(1 / c) + A, in which W y is
-the unknown.
+step d follows for every asperity, touching or open. Cholesky's method factorises diag(1 / c) + A
+instead, with the unknown W y.
 """
 
 from __future__ import annotations

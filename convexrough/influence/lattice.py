@@ -285,11 +285,10 @@ class LatticeInfluence(coupling.Influence):
         """
         slices = slices or self.slices
         box, places = self._boxed_for(np.asarray(loads.high))
-        off_sites = None
-        if not self.layout.exact:
-            off_sites = self._off_sites(np.asarray(loads.high), box, places)
         total = self._on(box, slices, lambda: self._slice(box, slices)).sums(loads, places)
-        return total if off_sites is None else total + off_sites
+        if self.layout.exact:
+            return total
+        return total + self._off_sites(np.asarray(loads.high), box, places)
 
     def _on(self, box: SiteBox, name: object, make: Callable[[], Made]) -> Made:
         """The object on this box that `make` returns; threads can use other boxes meanwhile."""
