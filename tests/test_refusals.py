@@ -2,15 +2,13 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from scenes import MATERIAL, hexagonal
+from scenes import MATERIAL
 
 import convexrough as cr
-from convexrough.friction import order
-from convexrough.friction.levels import FrictionLevels
+from convexrough.bench.scenes import scene as bench_scene
 
 
 def test_no_onset_where_an_indentation_falls() -> None:
@@ -22,11 +20,8 @@ def test_no_onset_where_an_indentation_falls() -> None:
         cr.onset_gradient(contact, 0)
 
 
-def test_gradients_of_losses_have_bounds_only_where_order_is_proved(monkeypatch: Any) -> None:
-    contact = cr.press(replace(hexagonal(spacing=0.002), friction=0.5), approach=5e-5)
-    monkeypatch.setattr(order, "INVERTED", 0)
-    monkeypatch.setattr(order, "SWEPT", 1)
-    monkeypatch.setattr(FrictionLevels.order, "__defaults__", (0,))
+def test_gradients_of_losses_have_bounds_only_where_order_is_proved() -> None:
+    contact = cr.press(bench_scene("scattered", 6.0), approach=5e-5)
     cycle = cr.cycle(contact, maximum=0.1 * contact.load)
     assert cycle.order == "proved for one step"
     gradient = cycle.gradient()

@@ -1,14 +1,13 @@
 """Proof of order: no indentation falls as the load rises, which theorems on friction require.
 
-docs/theory/states.md, "The proof of order", defines the symbols and proves the theorem, the
-corollary, (3) and (4). C~ and delta are diagonal matrices. If at most `SWEPT` asperities touch,
-weights come from an inverse; else from `friction.sweeping` and then, for at most `INVERTED`, from
-an inverse.
+docs/theory/states.md, "The proof of order", defines the symbols and proves three theorems. The
+first two need distances only (`friction.spacing`); this file has theorem 3, its corollary and the
+bisection. C~ and delta are diagonal matrices. The weights of theorem 3 come from an inverse.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from itertools import pairwise
 from typing import Any, Literal, NamedTuple
@@ -21,7 +20,8 @@ from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, Indices
 from convexrough.convex.newton_step import correct
 from convexrough.errors import SolverError
-from convexrough.friction.sweeping import swept_rates
+from convexrough.friction.spacing import order_holds
+from convexrough.influence.coupling import Influence, inverse_distances
 from convexrough.normal.boxes import Box
 from convexrough.normal.level import Level, Rows, rows_of
 from convexrough.normal.stack import Stack
@@ -37,12 +37,12 @@ Order = Literal["proved", "proved for one step", "fails"]
 #: residual SOLVED.
 RATE_ROUNDING, SOLVED = 1e-9, 1e-10
 
-#: Numbers of touching asperities that decide where weights come from (see above); and the largest
-#: number for which a proof is tried. `cr.prove_order` has a limit of its own.
-SWEPT, INVERTED, MOST = 400, 800, 20_000
+#: Largest number of touching asperities for which weights are computed, unless asked for more.
+INVERTED = 800
 
 #: Largest number of intermediate levels of the bisection, with an inverse and without one; largest
-#: number of asperities of which an inverse bounds rates; number of times that (4) decreases m.
+#: number of asperities of which an inverse bounds rates, unless more may touch; number of times
+#: that (7) decreases m.
 BETWEEN, FEW_BETWEEN, MOST_BOUNDED, IMPROVEMENTS = 7, 1, 4 * INVERTED, 4
 
 #: Number of entries of matrices with which rates are computed together: they fit in a cache.
@@ -50,13 +50,13 @@ TOGETHER = 2**16
 
 
 def order_between(
-    at: Callable[[Fraction], Level], loads: Iterable[Fraction], most: int = MOST
+    at: Callable[[Fraction], Level], loads: Iterable[Fraction], most: int = INVERTED
 ) -> Order:
     """What is proved about order, by bisection, between the ends of `loads`, whose levels are in
     use.
 
     at   : function that returns the level at a load
-    most : largest number of touching asperities for which a proof is tried
+    most : largest number of touching asperities for which weights are computed
     """
     used = sorted(set(loads), reverse=True)
     top = at(used[0])
@@ -78,15 +78,17 @@ def order_between(
         if _falls([at(high), level, at(low)], [level], rising):
             return "fails"
         for a, b in ((high, middle), (middle, low)):
-            if rising.sum() > INVERTED or not proved_between(at(a), at(b), rising, most):
+            if rising.sum() > INVERTED or not proved_between(at(a), at(b), rising):
                 unproved.append((a, b))
         if not unproved:
             return "proved"
     return "proved for one step"
 
 
-def proved_between(upper: Level, lower: Level, rising: NDArray[np.bool_], most: int = MOST) -> bool:
-    """True if the upper level proves order down to the lower level, by the corollary.
+def proved_between(
+    upper: Level, lower: Level, rising: NDArray[np.bool_], most: int = INVERTED
+) -> bool:
+    """True if the upper level proves order down to the lower level.
 
     rising : (n,) true for asperities that may touch at the highest load of the path
     """
@@ -96,6 +98,8 @@ def proved_between(upper: Level, lower: Level, rising: NDArray[np.bool_], most: 
     influence = problem.influence
     span = _Span.of(rows_of([upper]), rows_of([lower]), problem.exact.coefficients, box)
     (c,), support = span.c, np.flatnonzero(~upper.open)
+    if order_holds(problem.scene, influence, influence.scale * c):
+        return True
     coupled = influence.apply(c)
     coupled = coupled + influence.rounding(c).of(coupled)
     rates = 1.0 - coupled * (1 + SAFETY) - SAFETY
@@ -103,24 +107,33 @@ def proved_between(upper: Level, lower: Level, rising: NDArray[np.bool_], most: 
     if len(left) == 0:
         return True
     both = np.concatenate((support, np.setdiff1d(left, support)))
-    if not span.regular.all() or len(support) > max(INVERTED, most):
+    too_many = len(support) > most or len(both) > max(2 * most, MOST_BOUNDED)
+    if too_many or not span.regular.all():
         return False
-    if len(support) > SWEPT:
-        swept = swept_rates(influence, c, rates, np.where(rising, 0.0, span.spare[0]))
-        if not span.unsettled(swept[None], rising).any():
-            return True
-    if len(support) > INVERTED or len(both) > MOST_BOUNDED:
-        return False
-    entries = influence.submatrix(both)[None, :, : len(support)]
+    entries = influence.scale * inverse_distances(influence.points[both], influence.points[support])
     error = np.full((1, 1), influence.entry_error)
-    return bool(span.settled(rates[None], rising, both[None], entries, error)[0])
+    return bool(span.settled(rates[None], rising, both[None], entries[None], error)[0])
 
 
 @np.errstate(all="ignore")
 def proved_in_rows(rows: Stack, box: Box, high: Rows, low: Rows) -> NDArray[np.bool_]:
     """(m,) `proved_between` for the levels in each row; `high` must have the path's top load."""
     span = _Span.of(high, low, rows.exact.coefficients, box)
-    operators = [it.influence for some, it in rows.coupled for _ in range(some.start, some.stop)]
+    alike = [it for some, it in rows.coupled for _ in range(some.start, some.stop)]
+    shells = [it.influence.scale * c for it, c in zip(alike, span.c, strict=True)]
+    each = zip(alike, shells, strict=True)
+    proved = np.array([order_holds(it.scene, it.influence, own) for it, own in each])
+    rest = np.flatnonzero(~proved)
+    if len(rest):
+        left = [alike[k].influence for k in rest]
+        proved[rest] = _proved_by_inverses(rows.only(rest), span.only(rest), left)
+    return proved
+
+
+def _proved_by_inverses(
+    rows: Stack, span: _Span, operators: Sequence[Influence]
+) -> NDArray[np.bool_]:
+    """(m,) `proved_in_rows` by theorem 3."""
     entry_error = np.array([[each.entry_error] for each in operators])
     lost = 1.01 * (entry_error + (span.c.shape[1] + 2) * ROUNDOFF)
     rates = 1.0 - rows.apply(span.c) * (1 + lost + SAFETY) - SAFETY
@@ -132,7 +145,7 @@ def proved_in_rows(rows: Stack, box: Box, high: Rows, low: Rows) -> NDArray[np.b
     for own, A, it in zip(entries, operators, order, strict=True):
         own[...] = A.matrix.take(it, 0).take(it[:count], 1)
     for some in threads.chunks(len(order), max(1, TOGETHER // (known * count))):
-        part = _Span._make(each[some] for each in span)
+        part = span.only(some)
         given = rates[some], part.support, order[some], entries[some], entry_error[some]
         proved[some] = part.settled(*given)
     return proved
@@ -164,6 +177,9 @@ class _Span(NamedTuple):
         regular = np.asarray(box.convexity_number * e < 1 - SAFETY)
         return cls(support, c, drop, depth, spare, steep, regular)
 
+    def only(self, rows: slice | Indices) -> _Span:
+        return _Span._make(each[rows] for each in self)
+
     def at(self, which: Indices) -> _Span:
         """The same quantities for only s asperities of each row, given by indices (m, s)."""
         wide = ("support", "c", "depth", "spare", "steep")
@@ -179,7 +195,7 @@ class _Span(NamedTuple):
         entries: Array,
         entry_error: Array,
     ) -> NDArray[np.bool_]:
-        """(m,) true where (3) proves order, with entries (m, r, s) of A for the asperities `order`.
+        """(m,) true where (6) proves order, with entries (m, r, s) of A for the asperities `order`.
 
         The first s of the r asperities include the support. `rates` (m, n) are known from row sums.
         """
@@ -201,7 +217,7 @@ class _Span(NamedTuple):
 
     @np.errstate(all="ignore")
     def rates(self, entries: Array, entry_error: Array) -> Array:
-        """(m, r) lower bounds (3) on rates, with the best weights; -inf where the theorem fails.
+        """(m, r) lower bounds (6) on rates, with the best weights; -inf where the theorem fails.
 
         entries     : (m, r, s) of A; columns are the s asperities, rows the same and r - s more
         entry_error : (m, 1) bound on the relative error of the entries

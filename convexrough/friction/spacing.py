@@ -1,0 +1,82 @@
+"""Order that follows from distances alone: theorems 1 and 2 of docs/theory/states.md.
+
+A touching asperity k has a shell of the radius R_k = 2 a_k / pi, with the contact radius a_k.
+Theorem 1: all rates are positive, at this load and at all lower ones, if the discs of radii 3 R_k
+around contact points do not overlap and contain no other contact point. Theorem 2: the same holds
+on a lattice if no R_k exceeds a number that depends on the shape of the lattice.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from convexrough.arrays import Array
+from convexrough.influence.coupling import Influence
+from convexrough.roundoff import SAFETY
+from convexrough.scene.lattice import Lattice
+from convexrough.scene.scene import Scene
+
+#: The radius of shells that do not overlap on a lattice, and a relative margin for rounding.
+HALF, MARGIN = 0.499, 1e-3
+
+#: Lattices with ring vectors of more than this many spacings are left out.
+LONGEST = 100
+
+
+def order_holds(scene: Scene, influence: Influence, shells: Array) -> bool:
+    """True if one of the theorems proves order for the shell radii (n,) [length]."""
+
+    def apart() -> bool:
+        lost = SAFETY + 2.0 * influence.entry_error
+        return influence.crowding(3.0 * shells) * (1.0 + lost) < 1
+
+    def regular() -> bool:
+        return float(shells.max(initial=0.0)) <= largest_shell(scene)
+
+    if scene.asperities.layout.made is None:  # to find a lattice, if there is one, takes longer
+        return apart() or regular()
+    return regular() or apart()
+
+
+def largest_shell(scene: Scene) -> float:
+    """[length] the number of theorem 2; 0 if the scene has no lattice, or no number is proved."""
+    if (lattice := scene.lattice) is None:
+        return 0.0
+    ring, (low, high) = lattice.cached(_Ring.of), scene.asperities.layout.corners
+    farthest = 3.0 * (float(np.hypot(*(high - low))) / lattice.spacing + ring.longest)
+    # Distances of points differ from those of sites by at most `off`, which includes rounding.
+    off = 3.0 * lattice.site_error / lattice.spacing + 1e-13
+    sure = ring.gain > 16.0 * off * farthest * ring.longest
+    return ring.shell * lattice.spacing if sure else 0.0
+
+
+class _Ring(NamedTuple):
+    """The charges of theorem 2; lengths are divided by the spacing of the lattice."""
+
+    longest: float  # largest |z_k|
+    shell: float  # largest radius of the shells
+    gain: float  # the least gain of asperities that carry no charge
+
+    @classmethod
+    def of(cls, lattice: Lattice) -> _Ring:
+        b1, b2 = basis = lattice.basis / lattice.spacing
+        (g11, g12), (_, g22) = basis @ basis.T
+        half = np.array([b1, b2, b1 - b2 if g12 > 0 else b1 + b2]) @ [1.0, 1.0j]
+        shares = np.array([g22 - abs(g12), g11 - abs(g12), abs(g12)])
+        z, w = np.concatenate((half, -half)), np.tile(shares / shares.sum() / 2, 2)
+        if (longest := float(np.abs(z).max())) > LONGEST:
+            return cls(longest, 0.0, 0.0)
+        m, n = np.ceil(4.0 * longest / np.sqrt([g11, g22])).astype(int)
+        steps = np.mgrid[-m : m + 1, -n : n + 1].reshape(2, -1).T  # all sites of the disc, and more
+        x = steps @ basis @ [1.0, 1.0j]
+        x = x[(np.abs(x) < 3.01 * longest) & steps.any(axis=1)]
+        apart = np.abs(x[:, None] - z)
+        own = apart < 0.5
+        potentials, charge = (w / np.where(own, np.inf, apart)).sum(axis=1), (w * own).sum(axis=1)
+        needed, ring = (1.0 + MARGIN) / np.abs(x) - potentials, charge > 0
+        shell = charge[ring & (needed > 0)] / needed[ring & (needed > 0)]
+        gains = (np.abs(x) * potentials - 1.0) * np.abs(x) ** 2
+        far = (w * np.abs(z) ** 2).sum() / 8 - 0.75 * abs((w * z**2).sum())
+        return cls(longest, shell.min(initial=HALF), min(far, gains[~ring].min()))
