@@ -1,8 +1,8 @@
 """Proof of order: no indentation falls as the load rises, which theorems on friction require.
 
 docs/theory/states.md, "The proof of order", defines the symbols and proves three theorems. The
-first two need distances only (`friction.spacing`); this file has theorem 3, its corollary and the
-bisection. C~ and delta are diagonal matrices. The weights of theorem 3 come from an inverse.
+first two need distances only (`friction.spacing`); this file has theorem 3, the corollary and
+a bisection. C~ is a diagonal matrix. The weights of theorem 3 come from an inverse.
 """
 
 from __future__ import annotations
@@ -41,9 +41,8 @@ RATE_ROUNDING, SOLVED = 1e-9, 1e-10
 INVERTED = 800
 
 #: Largest number of intermediate levels of the bisection, with an inverse and without one; largest
-#: number of asperities of which an inverse bounds rates, unless more may touch; number of times
-#: that (7) decreases m.
-BETWEEN, FEW_BETWEEN, MOST_BOUNDED, IMPROVEMENTS = 7, 1, 4 * INVERTED, 4
+#: number of asperities of which an inverse bounds rates, unless more may touch.
+BETWEEN, FEW_BETWEEN, MOST_BOUNDED = 7, 1, 4 * INVERTED
 
 #: Number of entries of matrices with which rates are computed together: they fit in a cache.
 TOGETHER = 2**16
@@ -156,10 +155,7 @@ class _Span(NamedTuple):
 
     support: NDArray[np.bool_]
     c: Array  # diagonal of C~
-    drop: Array  # F = D0(L1) - D0(L0)
-    depth: Array  # lower bounds on the indentations at L1
     spare: Array  # largest u of the corollary: open asperities with rates above -u stay open
-    steep: Array  # k^(3/2), with the coefficient k of Hertz's law n = k P^(2/3)
     regular: NDArray[np.bool_]  # true if I + A C is regular for 0 <= C <= C~
 
     @classmethod
@@ -170,22 +166,12 @@ class _Span(NamedTuple):
         # theta = `box.convexity_number`, H^-1 = diag(`box.compliance`): as H + A >= (1 - theta) H,
         # C~^-1 + A >= (1 - theta e) C~^-1 where C~ <= e H^-1.
         e = np.where(support, c * box.compliance, 0.0).max(axis=1, keepdims=True)
-        drop, depth = (high.approach - low.approach).upper[:, None], high.indentation.lower
-        gaps = np.maximum(-high.indentation.upper, 0.0)  # at least
-        spare = np.nan_to_num(gaps / drop, posinf=np.inf) * (1 - SAFETY)
-        steep = np.broadcast_to(k.upper**1.5, c.shape)
-        regular = np.asarray(box.convexity_number * e < 1 - SAFETY)
-        return cls(support, c, drop, depth, spare, steep, regular)
+        drop, gaps = (high.approach - low.approach).upper[:, None], -high.indentation.upper
+        spare = np.nan_to_num(np.maximum(gaps, 0.0) / drop, posinf=np.inf) * (1 - SAFETY)
+        return cls(support, c, spare, np.asarray(box.convexity_number * e < 1 - SAFETY))
 
     def only(self, rows: slice | Indices) -> _Span:
         return _Span._make(each[rows] for each in self)
-
-    def at(self, which: Indices) -> _Span:
-        """The same quantities for only s asperities of each row, given by indices (m, s)."""
-        wide = ("support", "c", "depth", "spare", "steep")
-        return self._replace(
-            **{name: np.take_along_axis(getattr(self, name), which, axis=1) for name in wide}
-        )
 
     def settled(
         self,
@@ -199,8 +185,8 @@ class _Span(NamedTuple):
 
         The first s of the r asperities include the support. `rates` (m, n) are known from row sums.
         """
-        rates[self.support] = -np.inf
-        found = self.at(order[:, : entries.shape[2]]).rates(entries, entry_error)
+        c = np.take_along_axis(self.c, order[:, : entries.shape[2]], axis=1)
+        found = rates_from(c, entries, entry_error)
         found = np.maximum(found, np.take_along_axis(rates, order, axis=1))
         np.put_along_axis(rates, order, found, axis=1)
         return np.asarray(self.regular[:, 0] & ~self.unsettled(rates, rising).any(axis=1))
@@ -209,46 +195,29 @@ class _Span(NamedTuple):
         """(m, n) true where order is not proved: the rate may be negative, or the gap may close."""
         return np.asarray(~((rates > 0) | (~rising & (rates > -self.spare))))
 
-    def _delta(self, m: Array) -> Array:
-        """(m, s) the smallest delta of the corollary, for bounds m on the rates."""
-        fallen = np.maximum(self.depth - m * self.drop * (1 + SAFETY), 0.0)
-        slopes = 1.5 * np.sqrt(fallen) / self.steep
-        return np.asarray(np.clip(self.c - slopes * (1 - SAFETY) + SAFETY * self.c, 0.0, self.c))
 
-    @np.errstate(all="ignore")
-    def rates(self, entries: Array, entry_error: Array) -> Array:
-        """(m, r) lower bounds (6) on rates, with the best weights; -inf where the theorem fails.
+@np.errstate(all="ignore")
+def rates_from(stiffness: Array, entries: Array, entry_error: Array) -> Array:
+    """(m, r) lower bounds (6) on rates, with weights from an inverse.
 
-        entries     : (m, r, s) of A; columns are the s asperities, rows the same and r - s more
-        entry_error : (m, 1) bound on the relative error of the entries
-        """
-        c, count = self.c[:, :, None], self.c.shape[1]
-        some = np.s_[:, :count]  # the s asperities
-        matrix = entries[some] * self.c[:, :, None]
-        diagonals(matrix)[...] = 1.0
-        X = np.linalg.inv(matrix)
-        v = entries @ X
-        v[some] -= (diagonals(v) / diagonals(X))[:, :, None] * X
-        diagonals(v)[...] = 0.0
-        left = v @ matrix  # t_k, then t_k - A_ik
-        own = np.maximum(diagonals(left), 0.0) * self.c
-        left -= entries
-        np.minimum(diagonals(left), 0.0, out=diagonals(left))
-        rest = 1.0 - (v @ c)[:, :, 0]
-        lost = 1.01 * (entry_error + (count + 16) * ROUNDOFF)
-        rounding = np.abs(v) @ (matrix @ c) + entries @ c
-        off = (np.abs(left) @ c)[:, :, 0] + 2.0 * lost * rounding[:, :, 0] + SAFETY
-        room, m = 1.0 - own - off[some], np.ones(self.c.shape)
-        positive = np.maximum(v, 0.0)
-        for _ in range(IMPROVEMENTS):
-            changed = (self._delta(m) * m)[:, :, None]
-            above = rest[some] + (positive[some] @ changed)[:, :, 0] + off[some]
-            m = np.where(room > 0, np.minimum(m, np.maximum(above, 0.0) / room), m)
-        changed = (self._delta(m) * m)[:, :, None]
-        known = ~self.support | ((room > 0) & (np.abs(rest[some]) <= 2.0 * room))
-        below = rest - ((positive - v) @ changed)[:, :, 0] - 2.0 * off
-        sure = known & (~self.support | (below[some] > 0))
-        return np.where(sure.all(axis=1, keepdims=True), below, -np.inf)
+    stiffness   : (m, s) diagonal of C~
+    entries     : (m, r, s) of A; columns are the s asperities, rows the same and r - s more
+    entry_error : (m, 1) bound on the relative error of the entries
+    """
+    c, count = stiffness[:, :, None], stiffness.shape[1]
+    some = np.s_[:, :count]  # the s asperities
+    matrix = entries[some] * c  # I + C~ A
+    diagonals(matrix)[...] = 1.0
+    X = np.linalg.inv(matrix)
+    v = entries @ X
+    v[some] -= (diagonals(v) / diagonals(X))[:, :, None] * X
+    diagonals(v)[...] = 0.0
+    np.maximum(v, 0.0, out=v)
+    missing = np.maximum(entries - v @ matrix, 0.0)
+    diagonals(missing)[...] = 0.0
+    lost = 2.02 * (entry_error + (count + 16) * ROUNDOFF)
+    rounding = (v @ (matrix @ c) + entries @ c)[:, :, 0]
+    return np.asarray(1.0 - ((v + missing) @ c)[:, :, 0] - lost * rounding - SAFETY)
 
 
 def diagonals(matrices: NDArray[Any]) -> NDArray[Any]:
