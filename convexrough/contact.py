@@ -47,7 +47,7 @@ BESIDE = 1.5
 
 #: A contact of at most this many asperities that can touch keeps what friction needs of its press;
 #: if the operator is a matrix, of at most `ALL_SHARP`.
-MOST_KEPT = 2**16
+MOST_KEPT = 2**19
 
 if TYPE_CHECKING:
     from convexrough.gradients.change import ContactChange, Direction
