@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.errors import SolverError
-from convexrough.influence.coupling import Influence
+from convexrough.influence.coupling import Influence, Smoother
 
 #: Largest number of touching asperities for which Cholesky's factorisation is cheapest, with and
 #: without a stored matrix. Heuristics, from timings.
@@ -35,6 +35,9 @@ SINGLE_LIMIT, DOUBLE_LIMIT = 2e-6, 1e-13
 #: Conjugate gradients also end if (r'M r)^(1/2), with the residual r and the preconditioner M, is
 #: below ENERGY times SINGLE_LIMIT or DOUBLE_LIMIT times its first value.
 ENERGY = 1e-2
+
+#: A step is made in two parts if TWICE times its tolerance is below the limit of single precision.
+TWICE = 30.0
 
 MOST_ITERATIONS = 500
 
@@ -72,7 +75,7 @@ def correct(
         if direct:
             step = _factorise(influence, extra, touching, root, defect, balanced)
         else:
-            step = _iterate(influence, extra, root, defect, balanced, tolerance)
+            step = _iterated(influence, extra, root, defect, balanced, tolerance)
         if step is not None:
             return step
     raise SolverError("the matrix of a step is not positive definite", solver="newton")
@@ -109,13 +112,40 @@ def softness_of(slopes: Array) -> Array:
     return np.asarray(1.0 / np.maximum(slopes, LEAST_SLOPE))
 
 
-def _iterate(
+def _iterated(
     influence: Influence,
     shells: Array | None,
     root: Array,
     defect: Array,
     balanced: bool,
     tolerance: float,
+) -> Array | None:
+    """The step by `_iterate`; where single precision is not enough, in two parts."""
+    smooth = influence.smoother(root)
+    step = _iterate(influence, smooth, shells, root, defect, balanced, tolerance)
+    if step is None or shells is not None or influence.stored or TWICE * tolerance > SINGLE_LIMIT:
+        return step
+    slopes = root**2
+    left, missing = defect + step + influence.apply(slopes * step), 0.0
+    if balanced:
+        left -= float(slopes @ left) / float(slopes.sum())  # beta
+        missing = -float(slopes @ step)
+    if not left.any():
+        return step
+    share = float(np.linalg.norm(left)) / float(np.linalg.norm(defect))
+    rest = _iterate(influence, smooth, None, root, left, balanced, tolerance / share, missing)
+    return None if rest is None else step + rest
+
+
+def _iterate(
+    influence: Influence,
+    smooth: Smoother | None,
+    shells: Array | None,
+    root: Array,
+    defect: Array,
+    balanced: bool,
+    tolerance: float,
+    total: float = 0.0,
 ) -> Array | None:
     """The step by preconditioned conjugate gradients (docs/theory/newton.md, "Many asperities");
     None if the matrix is not positive definite.
@@ -132,7 +162,6 @@ def _iterate(
     enough = max(tolerance, limit) * float(np.linalg.norm(defect)) / size
     w: Values = root.astype(dtype)
     diagonal = dtype(1) if shells is None else (1.0 + root * shells * root).astype(dtype)
-    smooth = influence.smoother(root)
     border = smooth(w)[0] if smooth and balanced else w
     weight, beta = float(w @ border), 0.0
 
@@ -153,11 +182,12 @@ def _iterate(
             z += dtype(off) * border
         return z, left, whole
 
-    residual: Values = -w * (defect / size).astype(dtype)
+    y = dtype(total / (size * weight)) * border
+    y_displacement = influence.apply(w * y) if total else np.zeros_like(w)  # A W y
+    residual: Values = -w * ((defect / size).astype(dtype) + y_displacement) - diagonal * y
     z, left, first = smoothed(residual)
     p = z.copy()
     squared = float(residual @ z)  # r' M r
-    y_displacement = np.zeros_like(w)  # A W y
     products = 0
     while left > enough and squared > (ENERGY * limit) ** 2 * first and products < MOST_ITERATIONS:
         q = influence.apply(w * p)

@@ -80,7 +80,7 @@ class Coupling(ABC):
     def falloff(self, strengths: Array, power: int) -> Array:
         """(m,) upper bounds on sum_j strengths_j / r_ij^power, often a few per cent too large.
 
-        The `strengths` (n,) are not negative; `power` is 2 or 3.
+        The `strengths` (n,) are not negative; `power` is 1, 2 or 3.
         """
 
 

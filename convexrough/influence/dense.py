@@ -56,7 +56,9 @@ class DenseInfluence(coupling.Influence):
 
     def falloff(self, strengths: Array, power: int) -> Array:
         inverse = self.entries / self.scale  # 1 / r, because powers of the scale may underflow
-        raised = inverse * inverse if power == 2 else inverse * inverse * inverse
+        raised = inverse
+        for _ in range(power - 1):
+            raised = raised * inverse
         loss = 1.01 * ((len(self) + 6) * ROUNDOFF + power * self.entry_error)
         return np.asarray((raised @ strengths) * (1.0 + loss))
 

@@ -109,10 +109,9 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
     elif not few:
         others = np.flatnonzero(weights == 0)
         couplings.append((others, sources.onto(points[others])))
-    displacement, pressing = np.empty(len(scene)), weights[which]
+    displacement = np.empty(len(scene))
     for index, coupling in couplings:
-        product = coupling.apply(pressing)
-        displacement[index] = product + coupling.rounding(pressing).of(product)
+        displacement[index] = coupling.falloff(weights[which], 1) * (sources.scale * (1 + SAFETY))
     least = scene.offsets - scene.offset_errors
     bound = approach_bound(weights, displacement, coefficients, least, load)
     if not np.isfinite(bound):

@@ -191,7 +191,7 @@ class NormalProblem:
             some = ((slopes > 0) | (defect != 0)).nonzero()[0]
             influence = influence.restricted(some)
         parts = influence, taken(self.shells, some), np.sqrt(slopes[some]), defect[some]
-        step = correct(*parts, balanced=self.by_load, tolerance=max(REDUCTION, enough))
+        step = correct(*parts, balanced=self.by_load, tolerance=float(enough) or REDUCTION)
         return among_zeros(step, some, len(self))
 
     def moved(self, loads: Pair, product: Ball, others: Pair) -> Ball:
