@@ -192,7 +192,7 @@ def prove_order(contact: Contact, *, most: int = 5_000) -> Order:
     docs/theory/states.md, "Order", defines order and the results "proved", "proved for one step"
     and "fails". Later results for this contact reuse the proof. On lattices, and where contacts are
     far apart, the proof takes no time at any size, and all functions make it. Elsewhere it takes
-    the inverse of a matrix, and other functions make it only if at most 800 asperities touch.
+    the inverse of a matrix, and other functions make it only if at most 2,000 asperities touch.
 
     most : largest number of touching asperities for which a matrix is inverted
 

@@ -37,12 +37,13 @@ Order = Literal["proved", "proved for one step", "fails"]
 #: residual SOLVED.
 RATE_ROUNDING, SOLVED = 1e-9, 1e-10
 
-#: Largest number of touching asperities for which weights are computed, unless asked for more.
-INVERTED = 800
+#: Largest number of touching asperities for which weights are computed, unless asked for more, and
+#: largest number for which they are computed at intermediate levels, too.
+INVERTED, BISECTED = 2000, 800
 
-#: Largest number of intermediate levels of the bisection, with an inverse and without one; largest
-#: number of asperities of which an inverse bounds rates, unless more may touch.
-BETWEEN, FEW_BETWEEN, MOST_BOUNDED = 7, 1, 4 * INVERTED
+#: Largest number of intermediate levels of the bisection, with weights and without; largest number
+#: of asperities whose rates are bounded, unless more may touch.
+BETWEEN, FEW_BETWEEN, MOST_BOUNDED = 7, 1, 4000
 
 #: Number of entries of matrices with which rates are computed together: they fit in a cache.
 TOGETHER = 2**16
@@ -65,7 +66,7 @@ def order_between(
     if _falls(map(at, used), map(at, used), rising):  # levels are computed as they are needed
         return "fails"
     unproved = [(used[0], used[-1])]
-    left = BETWEEN if rising.sum() <= INVERTED else FEW_BETWEEN
+    left = BETWEEN if rising.sum() <= BISECTED else FEW_BETWEEN
     while len(unproved) <= left:  # each interval needs at least one level
         left -= 1
         high, low = unproved.pop(0)
@@ -77,7 +78,7 @@ def order_between(
         if _falls([at(high), level, at(low)], [level], rising):
             return "fails"
         for a, b in ((high, middle), (middle, low)):
-            if rising.sum() > INVERTED or not proved_between(at(a), at(b), rising):
+            if rising.sum() > BISECTED or not proved_between(at(a), at(b), rising):
                 unproved.append((a, b))
         if not unproved:
             return "proved"

@@ -56,8 +56,8 @@ def falls(contact: cr.Contact, low: float = 0.0) -> bool:
 
 
 def test_order_of_thousands_on_a_lattice_is_proved_by_all() -> None:
-    """More than 1,000 of different heights touch; the bound of a loss is finite."""
-    contact = cr.press(bench_scene("rough", 6.0), approach=5e-5)
+    """More than 2,000 of different heights touch; the bound of a loss is finite."""
+    contact = cr.press(bench_scene("rough", 9.0), approach=5e-5)
     assert np.count_nonzero(contact.loads) > order.INVERTED
     cycle = cr.cycle(contact, maximum=0.25 * contact.load)
     assert cycle.order == "proved"
@@ -179,11 +179,10 @@ def test_no_proof_where_the_middle_is_lifted_out(load: float, share: float) -> N
         assert (found == "fails") == falls(contact, share)
 
 
-def test_order_is_proved_when_asked() -> None:
-    """1,162 of 2,083 touch, on no lattice, so no loss is proved; asked once, all are."""
-    scene = bench_scene("scattered", 6.0)
-    contact = cr.press(scene, approach=5e-5)
-    assert np.count_nonzero(contact.loads) > order.INVERTED
+def test_order_is_proved_when_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    """1,162 of 2,083 touch, on no lattice. Too many for a proof, so no loss is; asked once, all."""
+    contact = cr.press(bench_scene("scattered", 6.0), approach=5e-5)
+    monkeypatch.setattr(FrictionLevels.order, "__defaults__", (1000,))
     assert np.isinf(cr.cycle(contact, maximum=0.1 * contact.load).loss_error)
     assert cr.prove_order(contact, most=1000) == "proved for one step"
     assert cr.prove_order(contact) == "proved"
