@@ -97,18 +97,17 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
 
     It is `approach_bound` with the weights `smooth_loads`.
     """
-    modulus, points = scene.material.contact_modulus, scene.contact_points
+    modulus = scene.material.contact_modulus
     coefficients = hertz.local_coefficient(modulus, scene.relative_radii)
     weights = smooth_loads(scene, load)
-    few = len(scene) <= FEW_ASPERITIES
-    which = np.arange(len(scene)) if few else np.flatnonzero(weights)
+    one_box = scene.lattice is not None and influence in (None, "lattice")
+    every = one_box or len(scene) <= FEW_ASPERITIES
+    which = np.arange(len(scene)) if every else np.flatnonzero(weights)
     sources = couple(scene, which, 1.0 / (np.pi * modulus), influence)
-    couplings: list[tuple[Indices | slice, Coupling]] = [(which, sources)]
-    if not few and sources.name == "lattice":  # one box of sites for all
-        couplings = [(slice(None), sources.onto(points))]
-    elif not few:
+    couplings: list[tuple[Indices, Coupling]] = [(which, sources)]
+    if not every:
         others = np.flatnonzero(weights == 0)
-        couplings.append((others, sources.onto(points[others])))
+        couplings.append((others, sources.onto(scene.contact_points[others])))
     displacement = np.empty(len(scene))
     for index, coupling in couplings:
         displacement[index] = coupling.falloff(weights[which], 1) * (sources.scale * (1 + SAFETY))
