@@ -123,7 +123,7 @@ def proved_in_rows(rows: Stack, box: Box, high: Rows, low: Rows) -> NDArray[np.b
     shells = [it.influence.scale * c for it, c in zip(alike, span.c, strict=True)]
     each = zip(alike, shells, strict=True)
     proved = np.array([order_holds(it.scene, it.influence, own) for it, own in each])
-    rest = np.flatnonzero(~proved)
+    rest = np.flatnonzero(~proved & span.regular[:, 0])
     if len(rest):
         left = [alike[k].influence for k in rest]
         proved[rest] = _proved_by_inverses(rows.only(rest), span.only(rest), left)

@@ -3,7 +3,7 @@
 A touching asperity k has a shell of the radius R_k = 2 a_k / pi, with the contact radius a_k.
 Theorem 1: all rates are positive, at this load and at all lower ones, if the discs of radii 3 R_k
 around contact points do not overlap and contain no other contact point. Theorem 2: the same holds
-on a lattice if no R_k exceeds a number that depends on the shape of the lattice.
+on a lattice if no R_k exceeds a number below half the spacing that depends on the lattice's shape.
 """
 
 from __future__ import annotations
@@ -18,10 +18,11 @@ from convexrough.roundoff import SAFETY
 from convexrough.scene.lattice import Lattice
 from convexrough.scene.scene import Scene
 
-#: The radius of shells that do not overlap on a lattice, and a relative margin for rounding.
+#: [spacing] shells up to HALF do not overlap on a lattice. At the sites z, (5) must hold with the
+#: relative margin MARGIN, for rounding.
 HALF, MARGIN = 0.499, 1e-3
 
-#: Lattices with ring vectors of more than this many spacings are left out.
+#: Lattices on which a vector z of theorem 2 exceeds this many spacings are left out.
 LONGEST = 100
 
 
@@ -35,6 +36,8 @@ def order_holds(scene: Scene, influence: Influence, shells: Array) -> bool:
     def regular() -> bool:
         return float(shells.max(initial=0.0)) <= largest_shell(scene)
 
+    if not np.isfinite(shells).all():
+        return False
     if scene.asperities.layout.made is None:  # to find a lattice, if there is one, takes longer
         return apart() or regular()
     return regular() or apart()
@@ -57,7 +60,7 @@ class _Ring(NamedTuple):
 
     longest: float  # largest |z_k|
     shell: float  # largest radius of the shells
-    gain: float  # the least gain of asperities that carry no charge
+    gain: float  # at most |x|^3 times (left minus right side of (5)), for x other than the z
 
     @classmethod
     def of(cls, lattice: Lattice) -> _Ring:
