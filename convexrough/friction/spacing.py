@@ -14,6 +14,7 @@ import numpy as np
 
 from convexrough.arrays import Array
 from convexrough.influence.coupling import Influence
+from convexrough.influence.lattice import LatticeInfluence
 from convexrough.roundoff import SAFETY
 from convexrough.scene.lattice import Lattice
 from convexrough.scene.scene import Scene
@@ -28,19 +29,14 @@ LONGEST = 100
 
 def order_holds(scene: Scene, influence: Influence, shells: Array) -> bool:
     """True if one of the theorems proves order for the shell radii (n,) [length]."""
-
-    def apart() -> bool:
-        lost = SAFETY + 2.0 * influence.entry_error
-        return influence.crowding(3.0 * shells) * (1.0 + lost) < 1
-
-    def regular() -> bool:
-        return float(shells.max(initial=0.0)) <= largest_shell(scene)
-
     if not np.isfinite(shells).all():
         return False
-    if scene.asperities.layout.made is None:  # to find a lattice, if there is one, takes longer
-        return apart() or regular()
-    return regular() or apart()
+    # To find out whether few given points form a lattice takes too long.
+    known = scene.asperities.layout.made is not None or isinstance(influence, LatticeInfluence)
+    if known and float(shells.max(initial=0.0)) <= largest_shell(scene):
+        return True
+    lost = SAFETY + 2.0 * influence.entry_error
+    return influence.crowding(3.0 * shells) * (1.0 + lost) < 1
 
 
 def largest_shell(scene: Scene) -> float:
