@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from flint import arb, ctx
 from friction_scenes import SCENES
-from gradient_oracle import DIGITS, STEP, Setup, assert_close, exact
-from levels_reference import Bristles, cycle_loss, of_setup
+from gradient_oracle import assert_close, exact
+from levels_reference import Bristles, cycle_loss, judge_of, loss_and_displacement
 from path_scenes import LARGEST, PAPER, around, on_flat, shaded
 from scenes import MATERIAL, on_sphere
 
@@ -121,16 +121,12 @@ def test_gradients_of_one_asperity_are_within_their_bounds(fraction: float) -> N
         low = 1 + 10 ** rng.uniform(-5, -2)
         contact = cr.press(scene, approach=float(place @ place) / 600 * low)
         force = fraction * 0.5 * contact.load
-        setup = Setup.of(contact, "approach", [force])
-        state, cycle = cr.shear(contact, force=force), cr.cycle(contact, maximum=force)
-        with ctx.workdps(DIGITS):
-            step = exact([STEP])
-            up, down = (of_setup(setup.moved("heights", s * step), contact) for s in (1, -1))
-            for found, rise in (
-                (state.gradient(displacement=1.0), up.displacement - down.displacement),
-                (cycle.gradient(), up.energy - down.energy),
-            ):
-                assert_close(rise / (2 * arb(STEP)), found.heights, found.height_errors, "heights")
+        judge = judge_of(loss_and_displacement, contact, "approach", force)
+        loss = cr.cycle(contact, maximum=force).gradient()
+        moved = cr.shear(contact, force=force).gradient(displacement=1.0)
+        slopes = judge.difference("heights", exact([1.0]))
+        for found, true in zip((loss, moved), slopes, strict=True):
+            assert_close(true, found.heights, found.height_errors, "heights")
 
 
 def test_gradients_of_gaps_are_within_their_bounds() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from flint import arb, ctx
 from friction_scenes import FRICTION, pressed
-from gradient_oracle import DIGITS, STEP, Setup, exact
+from gradient_oracle import DIGITS, NAMES, STEP, Setup, exact
 from levels_reference import of_setup
 
 import convexrough as cr
@@ -29,16 +29,6 @@ def direction(contact: cr.Contact, holding: str, force: float, seed: int = 0) ->
     )  # fmt: skip
 
 
-def moved(setup: Setup, along: cr.Direction, holding: str, by: Any) -> Setup:
-    """The setup, by so many times the direction."""
-    names = ["heights", "tip_radii", "positions", "sphere_radius", "contact_modulus"]
-    steps = {
-        name: exact(getattr(along, name))[()] for name in (*names, "poisson_ratio", "friction")
-    }
-    steps |= {"control": arb(getattr(along, holding)), "forces": exact([along.force])}
-    return replace(setup, **{name: getattr(setup, name) + by * it for name, it in steps.items()})
-
-
 CASES = [
     ("paper", "load", 0.5), ("rough", "approach", 1e-6), ("rough, closest", "load", 0.3),
     ("rough, closest", "approach", 0.9), ("steel", "approach", 0.5),
@@ -56,9 +46,12 @@ def test_everything_that_changes(name: str, holding: str, fraction: float) -> No
     along = direction(contact, holding, force)
     change = cr.shear(contact, force=force).change(along)
     setup = Setup.of(contact, holding, [force])
+    steps = {name: exact(getattr(along, name))[()] for name in NAMES}
+    steps |= {"control": arb(getattr(along, holding)), "forces": exact([along.force])}
     with ctx.workdps(DIGITS):
         h = arb(STEP)
-        up, down = (of_setup(moved(setup, along, holding, s * h), contact) for s in (1, -1))
+        there = (setup.moved(**{name: s * h * it for name, it in steps.items()}) for s in (1, -1))
+        up, down = (of_setup(each, contact) for each in there)
 
         for name in CHANGED:
             number = attrgetter(name)
