@@ -7,6 +7,7 @@ from typing import Any
 import multiprecision
 import numpy as np
 from hypothesis import strategies as st
+from point_layouts import lattice_patch, turned
 
 import convexrough as cr
 from convexrough.influence import Kind, couple
@@ -141,12 +142,8 @@ def on_lattice(seed: int, count: int, crowding: float, roughness: float) -> tupl
     """As `scattered`, on a random lattice: sheared, turned and shifted, with holes."""
     rng = np.random.default_rng(seed)
     ratio, skew, angle = rng.uniform(1, 2), rng.uniform(-0.5, 0.5), rng.uniform(0, 2 * np.pi)
-    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-    basis = np.array([[1.0, 0.0], [skew, np.sqrt(max(ratio**2 - skew**2, 0.75))]]) @ turn
-    steps = np.arange(-8, 9)
-    sites = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
-    points = sites @ basis
-    points = points[np.argsort((points**2).sum(axis=1))]
+    basis = turned([[1.0, 0.0], [skew, np.sqrt(max(ratio**2 - skew**2, 0.75))]], angle)
+    points = lattice_patch(basis, count + count // 5)
     middle = min(count, 9)  # no holes here: this is where a lattice is looked for
     others = middle + rng.permutation(count + count // 5 - middle)[: count - middle]
     points = points[np.append(np.arange(middle), others)] + rng.uniform(-1, 1, 2)

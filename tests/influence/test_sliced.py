@@ -7,7 +7,7 @@ import pytest
 from flint import arb, ctx
 from multiprecision import exact, inverse_sum
 from numpy.typing import NDArray
-from point_layouts import on_lattice
+from point_layouts import lattice_patch, on_lattice
 
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair
@@ -111,10 +111,7 @@ def perturbed(seed: int, count: int) -> Array:
     """Points of a lattice, off their sites by rounding and as much as is allowed."""
     rng = np.random.default_rng(seed)
     basis = np.array([[1.0, 0.1], [0.45, 0.8]]) * 1e-3
-    steps = np.arange(-9, 10)
-    sites = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
-    sites = sites[np.argsort((sites**2).sum(axis=1))][:count]
-    points = sites @ basis + rng.uniform(-1, 1, 2)
+    points = lattice_patch(basis, count) + rng.uniform(-1, 1, 2)
     return np.asarray(points * (1 + rng.choice([-1, 0, 1], points.shape) * 2.0**-53))
 
 
