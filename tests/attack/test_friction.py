@@ -226,15 +226,6 @@ def test_general_steps_as_near_to_gross_sliding_as_rounding_allows() -> None:
     assert path.displacements[1] == pytest.approx(-path.displacements[0], rel=1e-6)
 
 
-@pytest.mark.parametrize("fraction", [1e-6, 1e-5, 1e-4])
-def test_a_steady_cycle_at_constant_load_is_a_cycle(fraction: float) -> None:
-    force = fraction * 0.5 * P
-    settled = cr.steady(PAPER, loads=[P, P], forces=[force, -force])
-    energy = cr.cycle(cr.press(PAPER, load=P), maximum=force).loss
-    assert settled.loss == pytest.approx(energy, rel=1e-8)
-    assert settled.loss_error <= 1e-8 * energy
-
-
 def test_losses_by_asperities_where_the_load_falls_below_a_front() -> None:
     """A cell begins with the front at a level that is above the load at the end of the cell."""
     loads = P * np.array([1.0, 1e-3, 1e-3])

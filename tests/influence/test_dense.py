@@ -1,13 +1,13 @@
 """The coupling as a matrix, its rounding bound, and the shell lemma."""
 
 import numpy as np
+from extended import middle
 from flint import arb, ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from multiprecision import exact, inverse_sum, of_scene
 from scenes import rough
 
-from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair
 from convexrough.influence.choice import couple
 from convexrough.influence.coupling import inverse_distances
@@ -15,10 +15,6 @@ from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.shells import shells
 
 SCALE = 0.37
-
-
-def middle(ball: Ball, row: int) -> arb:
-    return arb(float(ball.mid.high[row])) + arb(float(ball.mid.low[row]))
 
 
 @settings(max_examples=40, deadline=None)
@@ -50,7 +46,7 @@ def test_sums_are_known(
     ctx.dps = 120
     for row in {0, *rng.integers(0, count, 5).tolist()}:
         true = inverse_sum(exact(points), exact(loads.high) + exact(loads.low), row)
-        assert abs(middle(found, row) - true) <= arb(float(found.radius[row]))
+        assert abs(middle(found[row]) - true) <= arb(float(found.radius[row]))
     most = float(operator.apply(np.abs(high)).max()) / SCALE
     if layout == "grid" and 1e-150 < most < 1e150:
         assert found.radius.max() <= (1e-25 if kind == "uneven" else 1e-26) * most
@@ -65,7 +61,7 @@ def test_sums_where_points_are_pairs() -> None:
     points, _, _ = of_scene(scene)
     for row in range(0, len(scene), 7):
         true = inverse_sum(points, exact(loads.high), row)
-        assert abs(middle(found, row) - true) <= arb(float(found.radius[row]))
+        assert abs(middle(found[row]) - true) <= arb(float(found.radius[row]))
     assert (found.radius < 1e-26 * found.value).all()
 
 

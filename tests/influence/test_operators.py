@@ -13,7 +13,7 @@ from typing import Any
 import multiprecision
 import numpy as np
 import pytest
-from extended import inverse_sums, pulled
+from extended import inverse_sums, middle, pulled
 from flint import arb, ctx, fmpq
 from point_layouts import BASES, LAYOUTS, lattice_patch, on_lattice, turned
 from scenes import paper
@@ -257,7 +257,7 @@ def test_many_points_of_a_lattice_are_exactly_on_their_sites(family: str, geomet
                 apart = (along * (x - places[i][0])) ** 2 + (across * (y - places[i][1])) ** 2
                 if apart:
                     true += load * arb(fmpq(apart.numerator, apart.denominator)).rsqrt()
-            off = arb(found.mid.high[i]) + arb(found.mid.low[i]) - true
+            off = middle(found[i]) - true
             assert abs(float(off)) <= found.radius[i] <= 1e-21 * found.mid.high[i]
 
 
@@ -312,10 +312,7 @@ def assert_gaps_known(problem: NormalProblem, loads: Array, limit: float) -> Non
     with ctx.workprec(200):
         known = np.full(len(scene), arb(0))
         known[problem.candidates] = [arb(load) * arb(units.force) for load in loads]
-        level, *middles = (
-            arb(float(ball.mid.high)) + arb(float(ball.mid.low))
-            for ball in (found.approach, *found.gap)
-        )
+        level, middles = middle(found.approach), middle(found.gap)
         rows = list(range(0, len(problem), max(1, len(problem) // 12)))
         gaps = multiprecision.gaps(scene, known, arb(0), problem.candidates[rows].tolist())
         for m, gap in zip(rows, gaps, strict=True):

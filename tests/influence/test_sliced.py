@@ -4,6 +4,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from extended import middle
 from flint import arb, ctx
 from multiprecision import exact, inverse_sum
 from numpy.typing import NDArray
@@ -32,10 +33,6 @@ def sliced_on(
     distances, norm = Distances.of(exactly, max(shape)), box.kernel(1, np.float64).norm
     places = np.add.outer(np.arange(shape[0]) * box.stride, np.arange(shape[1])).ravel()
     return box, places, distances, Sliced.of(box, distances, norm * unit / length, unit, count)
-
-
-def middle(ball: Ball) -> arb:
-    return arb(float(ball.mid.high)) + arb(float(ball.mid.low))
 
 
 def among(ball: Ball, m: int) -> arb:
