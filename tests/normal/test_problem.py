@@ -9,16 +9,7 @@ from flint import arb, ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from scenes import (
-    OPERATORS,
-    PAPER_APPROACH,
-    hexagonal,
-    on_lattice,
-    on_sphere,
-    paper,
-    random_cases,
-    scattered,
-)
+from scenes import OPERATORS, hexagonal, on_lattice, on_sphere, paper, random_cases, scattered
 
 import convexrough as cr
 from convexrough.arithmetic.balls import Ball
@@ -45,7 +36,7 @@ def assembled(scene: cr.Scene, **control: Any) -> NormalProblem:
 
 def test_screening_drops_only_those_that_cannot_touch() -> None:
     # The ring at 4 spacings lies at D = 0 to rounding, and is kept.
-    assert len(assembled(paper(), approach=PAPER_APPROACH)) == 61
+    assert len(assembled(paper(), approach=5e-5)) == 61
     problem = assembled(paper(), approach=1e-5)
     inside = paper().asperities.distances < np.sqrt(2e-5)
     assert set(problem.candidates) == set(np.flatnonzero(inside))
