@@ -1,5 +1,6 @@
 """Scenes and scene generators that several tests share."""
 
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -102,14 +103,11 @@ NAMED = {
 @cache
 def operators(scene: cr.Scene) -> tuple[Kind, ...]:
     """Those of OPERATORS that the package accepts for a scene: asked of it, not assumed."""
-    return tuple(kind for kind in OPERATORS if _accepted(scene, kind))
-
-
-def _accepted(scene: cr.Scene, kind: Kind) -> bool:
-    try:
-        return couple(scene, np.arange(len(scene)), 1.0, kind).name == kind
-    except cr.InputError:
-        return False
+    accepted = []
+    for kind in OPERATORS:
+        with suppress(cr.InputError):
+            accepted.append(couple(scene, np.arange(len(scene)), 1.0, kind).name)
+    return tuple(accepted)
 
 
 #: (name, operator): each named scene with each operator that it allows.

@@ -3,7 +3,6 @@
 import subprocess
 import sys
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -41,15 +40,6 @@ def test_every_public_name_is_there() -> None:
     assert set(cr.__all__) == set(dir(cr))
     with pytest.raises(AttributeError, match="pres"):
         _ = cr.pres
-
-
-def wrong(call: str) -> Any:
-    scene = replace(paper(), friction=0.5)
-    contact = cr.press(scene, approach=PAPER_APPROACH)
-    two = pd.DataFrame({"x": [0.0, 1.0], "y": 0.0, "z": 0.0})
-    other = cr.press(cr.Scene(1.0, cr.Asperities([[0.0, 0.0]], 1.0), MATERIAL), approach=1e-4)
-    given = {"TWO": two, "OTHER": other, "scene": scene, "contact": contact}
-    return eval(call, {"cr": cr, "np": np, "pd": pd, **given})
 
 
 @pytest.mark.parametrize(
@@ -110,5 +100,10 @@ def wrong(call: str) -> Any:
     ],
 )  # fmt: skip
 def test_wrong_types_are_said(call: str, said: str) -> None:
+    scene = replace(paper(), friction=0.5)
+    contact = cr.press(scene, approach=PAPER_APPROACH)
+    two = pd.DataFrame({"x": [0.0, 1.0], "y": 0.0, "z": 0.0})
+    other = cr.press(cr.Scene(1.0, cr.Asperities([[0.0, 0.0]], 1.0), MATERIAL), approach=1e-4)
+    given = {"TWO": two, "OTHER": other, "scene": scene, "contact": contact}
     with pytest.raises(cr.InputError, match=said):
-        wrong(call)
+        eval(call, {"cr": cr, "np": np, "pd": pd, **given})

@@ -190,11 +190,6 @@ def test_what_could_touch_may_be_held_open_where_it_is_proved_to_be() -> None:
     wrong(both, "may touch is fixed open", argument__box__0=(0.0).hex(), pressed__radii=radii)
 
 
-def test_a_local_proof_is_not_a_global_one() -> None:
-    document = proof_of(*scenes.scattered(9, 6, 2.2, 0.1))
-    wrong(document, "claimed 'global', proved 'local'", claims__scope="global")
-
-
 @pytest.mark.parametrize("place", [("load",), ("loads", 1), ("gaps", 5)])
 def test_each_end_of_each_bound_counts(few: Any, place: tuple[Any, ...]) -> None:
     claimed = few["claims"][place[0]]
