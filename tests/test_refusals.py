@@ -50,6 +50,8 @@ BAD = [
     (lambda: cr.Asperities([[0, 0], [0, np.nan]], 1.0), r"positions\[1\]: found"),
     (lambda: cr.Asperities([[0, 1], [2, 3], [0, 1]], 1.0),
      r"asperities 0 and 2 \(from 0\) at a distance of 0"),
+    *((lambda size=size: cr.Asperities(size * np.eye(2), 1.0), "asperities 0 and 1 .* distance of")
+      for size in (5e-61, 1e-130, 1e-160)),
     (lambda: cr.Asperities.square(spacing=1, tip_radius=1, within=1, height_std=1),
      "seed: found None"),
     (lambda: cr.press(paper(), approach=1e-80), "choose other units"),

@@ -22,7 +22,7 @@ from gradient_oracle import (
     press,
 )
 from levels_reference import DIGITS, Level, judge_of
-from multiprecision import exact, travel_of
+from multiprecision import exact, quotient, travel_of
 from path_scenes import shaded
 from scenes import hexagonal
 
@@ -133,15 +133,12 @@ def walked(contact: cr.Contact, steps: Any, start: Any, weights: Any) -> Callabl
     """From loads and forces, rational, to losses and displacements, in many digits."""
 
     def value(setup: Setup, P: list[Fraction], Q: list[Fraction]) -> Any:
-        def number(each: Fraction) -> Any:
-            return arb(each.numerator) / arb(each.denominator)
-
         @cache
         def at(load: Fraction) -> tuple[Any, Any]:
             """V and D0; the highest asperity just touches at the load 0."""
             if load == 0:
                 return arb(0), -Level(setup, contact).offsets[np.argmax(contact.scene.offsets)]
-            there = replace(setup, control=number(load), by_load=True)
+            there = replace(setup, control=quotient(load), by_load=True)
             found = Level(there, near_to(contact.scene, float(load)))
             return found.energy, found.approach
 
@@ -152,15 +149,15 @@ def walked(contact: cr.Contact, steps: Any, start: Any, weights: Any) -> Callabl
             for piece in pieces:
                 (V0, D0), (V1, D1) = at(piece.top), at(piece.bottom)
                 before, after = piece.load_before, piece.load_after
-                run, fall = number(piece.top - piece.bottom), number(before - after)
+                run, fall = quotient(piece.top - piece.bottom), quotient(before - after)
                 (VP, DP), (VQ, _) = at(before), at(after)
                 mean = DP if fall == 0 else (VP - VQ) / fall
-                each = number(before - piece.top) * D0 - number(after - piece.bottom) * D1
+                each = quotient(before - piece.top) * D0 - quotient(after - piece.bottom) * D1
                 each += (2 - fall / run) * (V0 - V1) - run * mean
-                share = number(1 - piece.sign * piece.slope)
+                share = quotient(1 - piece.sign * piece.slope)
                 total += lost * travel * setup.friction * share * each
             if moved:
-                total += moved * travel * sum(number(b) * at(s)[1] for s, b in curve.bends)
+                total += moved * travel * sum(quotient(b) * at(s)[1] for s, b in curve.bends)
         return total
 
     return value

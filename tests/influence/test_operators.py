@@ -14,8 +14,8 @@ import multiprecision
 import numpy as np
 import pytest
 from extended import inverse_sums, middle, pulled
-from flint import arb, ctx, fmpq
-from multiprecision import exact
+from flint import arb, ctx
+from multiprecision import exact, quotient
 from point_layouts import BASES, LAYOUTS, lattice_patch, loadings, on_lattice, turned
 from scenes import paper
 
@@ -251,7 +251,7 @@ def test_many_points_of_a_lattice_are_exactly_on_their_sites(family: str, geomet
             for load, (x, y) in zip(loads.tolist(), places, strict=True):
                 apart = (along * (x - places[i][0])) ** 2 + (across * (y - places[i][1])) ** 2
                 if apart:
-                    true += load * arb(fmpq(apart.numerator, apart.denominator)).rsqrt()
+                    true += load * quotient(apart).rsqrt()
             off = middle(found[i]) - true
             assert abs(float(off)) <= found.radius[i] <= 1e-21 * found.mid.high[i]
 

@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 import pytest
 import scenes
-from flint import arb, ctx, fmpq
+from flint import arb, ctx
+from multiprecision import quotient
 from path_scenes import ring, shaded
 
 import convexrough as cr
@@ -288,10 +289,6 @@ def test_shells_prove_what_eigenvalues_show() -> None:
     assert accepted > overlapping > 8
 
 
-def exact(x: Fraction) -> arb:
-    return arb(fmpq(x.numerator, x.denominator))
-
-
 def test_intervals_hold_what_they_should() -> None:
     rng = random.Random(1)
 
@@ -315,7 +312,7 @@ def test_intervals_hold_what_they_should() -> None:
 
 def test_pi() -> None:
     with ctx.workdps(60):
-        assert exact(checker.PI.low) < arb.pi() < exact(checker.PI.high)
+        assert quotient(checker.PI.low) < arb.pi() < quotient(checker.PI.high)
 
 
 def test_cholesky_finds_where_the_matrix_turns_indefinite() -> None:
