@@ -1,11 +1,18 @@
 """Sums over pairs of points in 160 bits, as pairs of float64 numbers."""
 
+from typing import Any
+
 import numpy as np
 from flint import arb, ctx
 from multiprecision import exact
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+
+def middle(ball: Any) -> Any:
+    """The middle of a ball of the package, or of each, at working precision."""
+    return exact(ball.mid.high) + exact(ball.mid.low)
 
 
 def inverse_sums(

@@ -49,8 +49,8 @@ class Setup:
             holding == "load",
         )
 
-    def moved(self, name: str, by: Balls) -> "Setup":
-        return replace(self, **{name: getattr(self, name) + by})
+    def moved(self, **by: Balls) -> "Setup":
+        return replace(self, **{name: getattr(self, name) + each for name, each in by.items()})
 
 
 class Oracle:
@@ -82,7 +82,7 @@ class Oracle:
 
 
 class Judge:
-    """Derivatives of a number by differences of it: value(setup, near) -> (number, state)."""
+    """Derivatives of numbers by differences of them: value(setup, near) -> (numbers, state)."""
 
     def __init__(self, setup: Setup, value: Callable[[Setup, Any], tuple[Balls, Any]]) -> None:
         self.setup, self.value = setup, value
@@ -92,11 +92,11 @@ class Judge:
     def difference(self, name: str, direction: Balls) -> Balls:
         """The derivative along `direction` of one parameter, to 100 digits."""
         with ctx.workdps(DIGITS):
-            h = arb(STEP)
-            ends = [
-                self.value(self.setup.moved(name, s * h * direction), self.near) for s in (1, -1)
-            ]
-            return ((ends[0][0] - ends[1][0]) / (2 * h)).mid()
+            size = np.abs(np.atleast_1d(getattr(self.setup, name))).max()
+            h = arb(STEP) * (size if size > 0 else 1)
+            there = (self.setup.moved(**{name: s * h * direction}) for s in (1, -1))
+            up, down = (self.value(each, self.near)[0] for each in there)
+            return mid((up - down) / (2 * h))[()]
 
 
 def press(contact: cr.Contact, setup: Setup, near: Oracle | None) -> Oracle:
@@ -104,6 +104,10 @@ def press(contact: cr.Contact, setup: Setup, near: Oracle | None) -> Oracle:
         return Oracle(setup, exact(contact.loads), arb(contact.approach), 5)
     return Oracle(setup, near.loads, near.approach, 3)
 
+
+#: What everything depends on; friction is the last.
+NAMES = ("heights", "tip_radii", "positions", "sphere_radius", "contact_modulus",
+            "poisson_ratio", "friction")  # fmt: skip
 
 #: Names of the bounds on derivatives.
 ERRORS = {"heights": "height_errors", "tip_radii": "tip_radius_errors"}
@@ -121,9 +125,8 @@ def assert_slopes(
 ) -> None:
     """Every derivative within its bound of differences, arrays along random signs."""
     rng = np.random.default_rng(seed)
-    names = ["heights", "tip_radii", "positions", "sphere_radius", "contact_modulus"]
-    names += ["poisson_ratio"] + ["friction"] * (gradient.friction is not None)
-    for name in [*names, "control"]:
+    names = NAMES if gradient.friction is not None else NAMES[:-1]
+    for name in (*names, "control"):
         slopes, errors = known(gradient, gradient.holding if name == "control" else name)
         v = rng.choice([-1.0, 1.0], size=slopes.shape)
         assert_close(judge.difference(name, exact(v)[()]), slopes * v, errors, name, sharp)

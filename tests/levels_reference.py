@@ -3,13 +3,15 @@
 Two levels make friction states by `multiprecision.slide`; where order fails `Bristles` follow.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 from flint import arb, ctx
 from friction_scenes import FRICTION, pressed
-from gradient_oracle import DIGITS, Balls, Oracle, Setup, exact
+from gradient_oracle import DIGITS, Balls, Judge, Oracle, Setup, exact, press
 from multiprecision import cube_root, slide, travel_of
 
 import convexrough as cr
@@ -56,6 +58,22 @@ def of_setup(setup: Setup, contact: cr.Contact, near: Friction | None = None) ->
     left = (upper.load - T).mid()
     start = near.held if near else cr.press(contact.scene, load=float(left))
     return Friction(upper, Level(replace(setup, control=left, by_load=True), start), T)
+
+
+def judge_of(
+    number: Callable[[Any], Any], contact: cr.Contact, holding: str, *force: float
+) -> Judge:
+    """Of numbers of the contact, or of its state under a shear force."""
+
+    def value(setup: Setup, near: Any) -> tuple[Any, Any]:
+        make = of_setup(setup, contact, near) if force else press(contact, setup, near)
+        return number(make), make
+
+    return Judge(Setup.of(contact, holding, force), value)
+
+
+def loss_and_displacement(state: Friction) -> Balls:
+    return np.array([state.energy, state.displacement])
 
 
 def displaced(contact: cr.Contact, displacement: float, holding: str) -> Friction:

@@ -16,6 +16,7 @@ arithmetic, proves it. The oracle shares no code with the package that it judges
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from math import inf, log2
 from typing import Any, Literal, NamedTuple, TypeAlias
 
@@ -34,6 +35,10 @@ ONE: Balls = arb(1)
 exact = np.vectorize(arb, otypes=[object])
 mid = np.vectorize(arb.mid, otypes=[object])
 cube_root = np.vectorize(lambda ball: ZERO if ball == 0 else ball.root(3), otypes=[object])
+
+
+def quotient(x: Fraction) -> arb:
+    return arb(x.numerator) / arb(x.denominator)
 
 
 class NotProved(ArithmeticError):

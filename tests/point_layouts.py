@@ -44,6 +44,13 @@ def coincident(rng: np.random.Generator) -> np.ndarray:
 LAYOUTS = {each.__name__: each for each in (disc, clustered, two, line, jittered, coincident)}
 
 
+def loadings(count: int, rng: np.random.Generator) -> np.ndarray:
+    """(5, count) equal loads, over many decades, one, of either sign, and of few."""
+    equal, few = np.full(count, 0.5 + 2.0**-20), rng.random(count) * (rng.random(count) < 0.05)
+    signs, one = rng.uniform(-1.0, 1.0, count), np.eye(count)[count // 3]
+    return np.array([equal, 10 ** rng.uniform(-30, 0, count), one, signs, few])
+
+
 BASES = {
     "hexagonal": [[1.0, 0.0], [0.5, np.sqrt(0.75)]],
     "square": [[1.0, 0.0], [0.0, 1.0]],

@@ -1,5 +1,6 @@
 """Scenes and scene generators that several tests share."""
 
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -7,6 +8,7 @@ from typing import Any
 import multiprecision
 import numpy as np
 from hypothesis import strategies as st
+from point_layouts import lattice_patch, turned
 
 import convexrough as cr
 from convexrough.influence import Kind, couple
@@ -101,14 +103,11 @@ NAMED = {
 @cache
 def operators(scene: cr.Scene) -> tuple[Kind, ...]:
     """Those of OPERATORS that the package accepts for a scene: asked of it, not assumed."""
-    return tuple(kind for kind in OPERATORS if _accepted(scene, kind))
-
-
-def _accepted(scene: cr.Scene, kind: Kind) -> bool:
-    try:
-        return couple(scene, np.arange(len(scene)), 1.0, kind).name == kind
-    except cr.InputError:
-        return False
+    accepted = []
+    for kind in OPERATORS:
+        with suppress(cr.InputError):
+            accepted.append(couple(scene, np.arange(len(scene)), 1.0, kind).name)
+    return tuple(accepted)
 
 
 #: (name, operator): each named scene with each operator that it allows.
@@ -141,12 +140,8 @@ def on_lattice(seed: int, count: int, crowding: float, roughness: float) -> tupl
     """As `scattered`, on a random lattice: sheared, turned and shifted, with holes."""
     rng = np.random.default_rng(seed)
     ratio, skew, angle = rng.uniform(1, 2), rng.uniform(-0.5, 0.5), rng.uniform(0, 2 * np.pi)
-    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-    basis = np.array([[1.0, 0.0], [skew, np.sqrt(max(ratio**2 - skew**2, 0.75))]]) @ turn
-    steps = np.arange(-8, 9)
-    sites = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
-    points = sites @ basis
-    points = points[np.argsort((points**2).sum(axis=1))]
+    basis = turned([[1.0, 0.0], [skew, np.sqrt(max(ratio**2 - skew**2, 0.75))]], angle)
+    points = lattice_patch(basis, count + count // 5)
     middle = min(count, 9)  # no holes here: this is where a lattice is looked for
     others = middle + rng.permutation(count + count // 5 - middle)[: count - middle]
     points = points[np.append(np.arange(middle), others)] + rng.uniform(-1, 1, 2)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from extended import middle
 from flint import arb, ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -46,11 +47,10 @@ def exact(x: float) -> arb:
 
 def samples(ball: Ball, i: int) -> list[arb]:
     """The middle, both ends and others; where the radius is infinite, numbers of many sizes."""
-    middle = exact(ball.mid.high[i]) + exact(ball.mid.low[i])
-    radius = ball.radius[i]
+    mid, radius = middle(ball[i]), ball.radius[i]
     if radius == INF:
-        return [middle, arb(0), arb(1), arb(-1), arb("1e200"), arb("-1e-200")]
-    return [middle + exact(radius) * share for share in (-1, arb(-1) / 3, 0, arb(1) / 2, 1)]
+        return [mid, arb(0), arb(1), arb(-1), arb("1e200"), arb("-1e-200")]
+    return [mid + exact(radius) * share for share in (-1, arb(-1) / 3, 0, arb(1) / 2, 1)]
 
 
 def holds(ball: Ball, i: int, number: arb) -> bool:
@@ -59,8 +59,7 @@ def holds(ball: Ball, i: int, number: arb) -> bool:
     assert isfinite(ball.mid.high[i] + ball.mid.low[i])
     if radius == INF:
         return True
-    middle = exact(ball.mid.high[i]) + exact(ball.mid.low[i])
-    return bool(number.is_finite() and abs(number - middle) <= exact(radius))
+    return bool(number.is_finite() and abs(number - middle(ball[i])) <= exact(radius))
 
 
 @pytest.fixture(autouse=True)

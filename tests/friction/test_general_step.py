@@ -16,12 +16,14 @@ import convexrough as cr
 from convexrough.arrays import Array
 
 
-def agree(a: cr.LoadPath, b: cr.LoadPath, within: float) -> None:
-    P, X = a.loads.max(), np.abs(a.asperity_displacements).max()
-    assert_allclose(a.displacements, b.displacements, atol=within * X)
-    assert_allclose(a.asperity_forces, b.asperity_forces, atol=within * 0.5 * P)
-    assert_allclose(a.asperity_displacements, b.asperity_displacements, atol=within * X)
-    assert_allclose(a.drifts, b.drifts, atol=within * X)
+def differs(path: cr.LoadPath, known: cr.LoadPath) -> float:
+    """The largest difference of shear forces and displacements, relative to their largest."""
+    forces = np.abs(path.asperity_forces - known.asperity_forces).max()
+    found = float(forces / (0.5 * known.asperity_loads.max()))
+    for name in ("displacements", "asperity_displacements", "drifts"):
+        moved = np.abs(getattr(path, name) - getattr(known, name)).max()
+        found = max(found, float(moved / np.abs(known.displacements).max()))
+    return found
 
 
 @st.composite
@@ -44,7 +46,7 @@ def test_random_paths(sampled: tuple[cr.Scene, Array, Array], ties: bool) -> Non
         P, Q = P[[0, 0, 1, 1, 2, 0]], Q[[0, 1, 1, 1, 2, 0]] * (P.min() / P.max())
     path = cr.load_path(scene, loads=P, forces=Q)
     assume(path.order != "fails")
-    agree(path, cr.load_path(scene, loads=P, forces=Q, general_steps=1), 1e-12)
+    assert differs(cr.load_path(scene, loads=P, forces=Q, general_steps=1), path) <= 1e-12
 
 
 def test_where_order_fails() -> None:
@@ -83,14 +85,6 @@ def test_a_displacement_at_gross_sliding_or_just_below(given: dict[str, float]) 
         assert_allclose(state.forces, -gross.forces, rtol=1e-9)
     with pytest.raises(cr.InputError, match="gross sliding, expected at most X"):
         cr.shear(contact, displacement=1.001 * gross.displacement)
-
-
-def differs(path: cr.LoadPath, known: cr.LoadPath) -> float:
-    """The larger of the relative differences of shear forces and displacements."""
-    forces = np.abs(path.asperity_forces - known.asperity_forces).max()
-    moved = np.abs(path.displacements - known.displacements).max()
-    largest = 0.5 * known.asperity_loads.max(), np.abs(known.displacements).max()
-    return max(float(forces / largest[0]), float(moved / largest[1]))
 
 
 @pytest.mark.sample(1)

@@ -1,26 +1,22 @@
-"""Derivatives of losses and displacements against differences of levels in 130 digits."""
+"""Derivatives of losses and displacements, and forward ones, against differences of levels."""
 
 import pickle
 from dataclasses import replace
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
 import pytest
 from flint import arb, ctx
 from friction_scenes import FRICTION, SCENES, pressed, with_friction
-from gradient_oracle import DIGITS, STEP, Setup, assert_close, exact, known
-from levels_reference import of_setup
-from scenes import OPERATORS, hexagonal, paper, stepped
+from gradient_oracle import DIGITS, NAMES, STEP, Setup, assert_close, exact, known
+from levels_reference import judge_of, loss_and_displacement, of_setup
+from scenes import OPERATORS, hexagonal, paper, scattered, stepped
 
 import convexrough as cr
 
 #: Of the largest entry of its kind: what bounds may be from Q / f P = 1e-2 to 0.999.
 SHARP = 1e-14
-
-
-#: Everything that a loss or a displacement depends on, by the names of a setup.
-NAMES = ("heights", "tip_radii", "positions", "sphere_radius", "contact_modulus", "poisson_ratio",
-         "friction", "control", "forces")  # fmt: skip
 
 
 def assert_both(
@@ -30,28 +26,22 @@ def assert_both(
     loss = cr.cycle(contact, maximum=force).gradient(holding=holding)
     moved = cr.shear(contact, force=force).gradient(displacement=1.0, holding=holding)
     assert max(loss.balance_defect, moved.balance_defect) < 1e-14
-    setup, rng = Setup.of(contact, holding, [force]), np.random.default_rng(seed)
+    judge = judge_of(loss_and_displacement, contact, holding, force)
+    rng, both = np.random.default_rng(seed), ((loss, "maximum"), (moved, "force"))
     with ctx.workdps(DIGITS):
-        h, here = arb(STEP), of_setup(setup, contact)
-        assert abs(arb(loss.value) - here.energy) <= loss.value_error
-        assert abs(arb(moved.value) - here.displacement) <= moved.value_error
-        for name in NAMES:
-            signs = rng.choice([-1.0, 1.0], size=np.shape(getattr(setup, name)))
-            some = rng.choice(signs.size, min(2, signs.size), replace=False)
-            for v in (signs, *np.eye(signs.size)[some].reshape(-1, *signs.shape)):
-                step = h * exact(v)[()]
-                up, down = (of_setup(setup.moved(name, s * step), contact, here) for s in (1, -1))
-                for gradient, rise in (
-                    (loss, up.energy - down.energy),
-                    (moved, up.displacement - down.displacement),
-                ):
-                    mine = "maximum" if gradient.force is None else "force"
-                    slopes, errors = known(
-                        gradient, {"control": holding, "forces": mine}.get(name, name)
-                    )
-                    both = 2.0 if (name, mine) == ("forces", "maximum") else 1.0  # ends move
-                    parts = both * slopes * v, both * errors * np.abs(v)
-                    assert_close(rise / (2 * h), *parts, name, sharp if v is signs else 0.0)
+        for gradient, true in zip((loss, moved), judge.at, strict=True):
+            assert abs(arb(gradient.value) - true) <= gradient.value_error
+    for name in (*NAMES, "control", "forces"):
+        signs = rng.choice([-1.0, 1.0], size=np.shape(getattr(judge.setup, name)))
+        some = rng.choice(signs.size, min(2, signs.size), replace=False)
+        for v in (signs, *np.eye(signs.size)[some].reshape(-1, *signs.shape)):
+            true_slopes = judge.difference(name, exact(v)[()])
+            for (gradient, own), true in zip(both, true_slopes, strict=True):
+                one = {"control": holding, "forces": own}.get(name, name)
+                slopes, errors = known(gradient, one)
+                ends = 2.0 if one == "maximum" else 1.0  # that move
+                parts = ends * slopes * v, ends * errors * np.abs(v)
+                assert_close(true, *parts, name, sharp if v is signs else 0.0)
 
 
 @pytest.mark.sample(3)
@@ -70,28 +60,15 @@ def test_bounds_are_honest_where_they_are_not_sharp(fraction: float) -> None:
     assert_both(contact, fraction * FRICTION * contact.load, "load", 0.0)
 
 
-def random_scene(rng: np.random.Generator) -> tuple[cr.Scene, float]:
-    """One to eight asperities anywhere, of any sizes, and an approach that presses some."""
-    n = int(rng.integers(1, 9))
-    spacing = 10.0 ** rng.uniform(-3, -1)
-    points = np.stack(np.divmod(rng.permutation(16)[:n], 4), axis=1) * spacing
-    points += rng.uniform(-0.2, 0.2, size=(n, 2)) * spacing
-    tips = spacing * 10.0 ** rng.uniform(-0.5, 1.0, size=n)
-    approach = tips.min() * 10.0 ** rng.uniform(-4, -2)
-    heights = approach * rng.normal(size=n) * 10.0 ** rng.uniform(-2, 0)
-    geometry: Any = rng.choice(["summit", "closest"])
-    material = cr.Material(10.0 ** rng.uniform(-1, 12), rng.uniform(0.0, 0.5))
-    asperities = cr.Asperities(points, tips, heights)
-    radius = spacing * 10.0 ** rng.uniform(1, 4)
-    scene = cr.Scene(radius, asperities, material, rng.uniform(0.1, 1.0), geometry)
-    return scene, float(approach - scene.offsets.max())
-
-
 @pytest.mark.sample(5)
 @pytest.mark.parametrize("seed", range(40))
 def test_no_bound_is_too_small(seed: int) -> None:
+    """Of one to eight asperities anywhere, of any sizes and friction."""
     rng = np.random.default_rng(seed)
-    scene, approach = random_scene(rng)
+    scene, approach = scattered(seed, int(rng.integers(1, 9)), rng.uniform(0.05, 0.8), 0.5)
+    tips = scene.asperities.tip_radii * 10.0 ** rng.uniform(-0.7, 0.7, len(scene))
+    scene = replace(scene, asperities=replace(scene.asperities, tip_radii=tips))
+    scene = with_friction(scene, rng.uniform(0.1, 1.0), rng.uniform(0.0, 0.5))
     contact = cr.press(scene, approach=approach)
     if contact.certificate.scope == "none":
         return
@@ -125,7 +102,7 @@ def test_many_asperities_by_every_operator() -> None:
     contacts = {kind: cr.press(scene, load=1e-8, influence=kind) for kind in OPERATORS}
     found = {kind: cr.cycle(each, maximum=2e-9).gradient() for kind, each in contacts.items()}
     for kind, each in found.items():
-        for name in ("heights", "tip_radii", "positions", "sphere_radius", "contact_modulus"):
+        for name in NAMES[:5]:
             values, errors = known(each, name)
             true, known_to = known(found["dense"], name)
             assert (np.abs(values - true) <= errors + known_to).all(), (kind, name)
@@ -176,3 +153,58 @@ def test_weights_along_a_history() -> None:
     moved = path.gradient(displacements=[0.0, 0.0, 1.0], holding="load")
     once = cr.shear(contact, force=force).gradient(displacement=1.0, holding="load")
     assert moved.load == pytest.approx(once.load, rel=1e-14)
+
+
+def direction(contact: cr.Contact, holding: str, force: float, seed: int = 0) -> cr.Direction:
+    """A change of everything at once, each by about its own size."""
+    rng, scene = np.random.default_rng(seed), contact.scene
+    n, f = len(scene), scene.friction or 1.0
+    control: Any = {holding: getattr(contact, holding) * 0.7}
+    return cr.Direction(
+        heights=contact.approach * rng.normal(size=n),
+        tip_radii=scene.asperities.tip_radii * rng.normal(size=n),
+        positions=0.0025 * rng.normal(size=(n, 2)) * (np.ptp(scene.asperities.positions) / 0.02),
+        sphere_radius=-0.3 * scene.sphere_radius,
+        contact_modulus=0.4 * scene.material.contact_modulus, poisson_ratio=0.2, friction=-0.6 * f,
+        force=0.8 * force, **control,
+    )  # fmt: skip
+
+
+CASES = [
+    ("paper", "load", 0.5), ("rough", "approach", 1e-6), ("rough, closest", "load", 0.3),
+    ("rough, closest", "approach", 0.9), ("steel", "approach", 0.5),
+]  # fmt: skip
+
+CHANGED = ["pressed.loads", "pressed.gaps", "pressed.load", "pressed.approach"]
+CHANGED += ["forces", "slips", "displacement"]
+
+
+@pytest.mark.sample(2)
+@pytest.mark.parametrize(("name", "holding", "fraction"), CASES)
+def test_everything_that_changes(name: str, holding: str, fraction: float) -> None:
+    contact = pressed(name, control=holding)
+    force = fraction * FRICTION * contact.load
+    along = direction(contact, holding, force)
+    change = cr.shear(contact, force=force).change(along)
+    setup = Setup.of(contact, holding, [force])
+    steps = {name: exact(getattr(along, name))[()] for name in NAMES}
+    steps |= {"control": arb(getattr(along, holding)), "forces": exact([along.force])}
+    with ctx.workdps(DIGITS):
+        h = arb(STEP)
+        there = (setup.moved(**{name: s * h * it for name, it in steps.items()}) for s in (1, -1))
+        up, down = (of_setup(each, contact) for each in there)
+
+        for name in CHANGED:
+            number = attrgetter(name)
+            true = np.array((number(up) - number(down)) / (2 * h), dtype=float)
+            most = np.abs(true).max()
+            np.testing.assert_allclose(number(change), true, rtol=0, atol=2e-13 * most)
+
+
+def test_both_prescriptions_are_held_unless_told_otherwise() -> None:
+    by_load, by_approach = pressed("rough", control="load"), pressed("rough")
+    raised = cr.Direction(heights=1e-9)
+    assert by_load.change(raised).approach == pytest.approx(-1e-9, rel=1e-12)
+    assert abs(by_load.change(raised).load) < 1e-12 * by_approach.change(raised).load
+    same = by_load.change(replace(raised, approach=0.0))
+    np.testing.assert_allclose(same.loads, by_approach.change(raised).loads, rtol=1e-10, atol=1e-25)

@@ -13,9 +13,10 @@ from typing import Any
 import multiprecision
 import numpy as np
 import pytest
-from extended import inverse_sums, pulled
-from flint import arb, ctx, fmpq
-from point_layouts import BASES, LAYOUTS, lattice_patch, on_lattice, turned
+from extended import inverse_sums, middle, pulled
+from flint import arb, ctx
+from multiprecision import exact, quotient
+from point_layouts import BASES, LAYOUTS, lattice_patch, loadings, on_lattice, turned
 from scenes import paper
 
 import convexrough as cr
@@ -60,13 +61,6 @@ CASES = [
     *(("scattered", layout) for layout in LAYOUTS),
 ]
 each_operator = pytest.mark.parametrize(("kind", "layout"), CASES)
-
-
-def loadings(count: int, rng: np.random.Generator) -> Array:
-    """(5, count) equal loads, over many decades, one, of either sign, and of few."""
-    few = rng.random(count) * (rng.random(count) < 0.05)
-    signs, one = rng.choice([-1.0, 1.0], count), np.eye(count)[count // 3]
-    return np.array([np.ones(count), 10 ** rng.uniform(-30, 0, count), one, signs, few])
 
 
 @pytest.mark.sample(4)
@@ -184,6 +178,15 @@ def test_threads_whose_loads_reach_unequally_far_get_their_own_sums() -> None:
         assert (np.abs((found - true).value) <= found.radius + true.radius).all()
 
 
+def off_and_errors(A: Influence, load: Array, rows: Any) -> tuple[Array, Array]:
+    """How far slopes in these rows are from the true ones, and the bounds of all, which hold."""
+    slopes = A.slopes(load)
+    true = np.array([pulled(A.points, load, i, A.scale) for i in rows])
+    off = np.abs((exact(slopes.value[rows]) - true).astype(float))
+    assert (off <= slopes.error[rows]).all()
+    return off, slopes.error
+
+
 @pytest.mark.sample(4)
 @each_operator
 @pytest.mark.parametrize("seed", range(8))
@@ -194,13 +197,9 @@ def test_slopes(kind: str, layout: str, seed: int) -> None:
     rows = rng.integers(0, len(A), 10)
     shift = np.abs(A.points.mean(axis=0)).max() if kind == "lattice" else 1.0
     for load in loadings(len(A), rng):
-        found, errors = (slopes := A.slopes(load)).value, slopes.error
+        off, errors = off_and_errors(A, load, rows)
         top = (SCALE * A.falloff(np.abs(load), 2)).max()
-        for i in rows:
-            true = pulled(A.points, load, i, SCALE)
-            off = np.abs([float(arb(x) - y) for x, y in zip(found[i], true, strict=True)])
-            assert (off <= errors[i]).all()
-            assert off.max() <= 1e-10 * top or layout not in (*EVEN, *BASES)
+        assert off.max() <= 1e-10 * top or layout not in (*EVEN, *BASES)
         limit = {"lattice": 1e-11 * max(1.0, 1e-3 * shift), "dense": 1e-12}.get(kind, np.inf)
         assert errors.max() <= limit * top or layout == "coincident"
 
@@ -213,11 +212,7 @@ def test_slopes_on_lattices_that_are_made(family: str, most: float) -> None:
     scene = cr.Scene(1e3, array, cr.Material(1.0, 0.3), geometry="summit")
     A = NormalProblem.assemble(scene, approach=1.0, influence="lattice").influence
     for load in loadings(len(A), rng):
-        found, errors = (slopes := A.slopes(load)).value, slopes.error
-        for i in rng.integers(0, len(A), 3):
-            true = pulled(A.points, load, i, A.scale)
-            off = [abs(float(arb(x) - y)) for x, y in zip(found[i], true, strict=True)]
-            assert (np.array(off) <= errors[i]).all()
+        _, errors = off_and_errors(A, load, rng.integers(0, len(A), 3))
         assert errors.max() <= most * (A.scale * A.falloff(np.abs(load), 2)).max()
 
 
@@ -256,8 +251,8 @@ def test_many_points_of_a_lattice_are_exactly_on_their_sites(family: str, geomet
             for load, (x, y) in zip(loads.tolist(), places, strict=True):
                 apart = (along * (x - places[i][0])) ** 2 + (across * (y - places[i][1])) ** 2
                 if apart:
-                    true += load * arb(fmpq(apart.numerator, apart.denominator)).rsqrt()
-            off = arb(found.mid.high[i]) + arb(found.mid.low[i]) - true
+                    true += load * quotient(apart).rsqrt()
+            off = middle(found[i]) - true
             assert abs(float(off)) <= found.radius[i] <= 1e-21 * found.mid.high[i]
 
 
@@ -312,10 +307,7 @@ def assert_gaps_known(problem: NormalProblem, loads: Array, limit: float) -> Non
     with ctx.workprec(200):
         known = np.full(len(scene), arb(0))
         known[problem.candidates] = [arb(load) * arb(units.force) for load in loads]
-        level, *middles = (
-            arb(float(ball.mid.high)) + arb(float(ball.mid.low))
-            for ball in (found.approach, *found.gap)
-        )
+        level, middles = middle(found.approach), middle(found.gap)
         rows = list(range(0, len(problem), max(1, len(problem) // 12)))
         gaps = multiprecision.gaps(scene, known, arb(0), problem.candidates[rows].tolist())
         for m, gap in zip(rows, gaps, strict=True):

@@ -7,6 +7,7 @@ from math import ceil, floor, log2
 import numpy as np
 import pytest
 from flint import arb, ctx
+from multiprecision import quotient
 from point_layouts import disc
 
 from convexrough.arithmetic.balls import Ball
@@ -30,13 +31,9 @@ def soft(kernel: Softened, squares: Fraction) -> arb:
     t = 1 - squares / Fraction(kernel.reach) ** 2
     a = arb(kernel.reach)
     if t <= 0:
-        return 1 / ball(squares).sqrt() ** kernel.power
+        return 1 / quotient(squares).sqrt() ** kernel.power
     terms = exact_series(kernel.order, kernel.power)
-    return ball(sum((c * t**k for k, c in enumerate(terms)), Fraction(0))) / a**kernel.power
-
-
-def ball(x: Fraction) -> arb:
-    return arb(x.numerator) / arb(x.denominator)
+    return quotient(sum((c * t**k for k, c in enumerate(terms)), Fraction(0))) / a**kernel.power
 
 
 def weight(place: float, node: int, order: int) -> Fraction:

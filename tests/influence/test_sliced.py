@@ -4,10 +4,11 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from extended import middle
 from flint import arb, ctx
 from multiprecision import exact, inverse_sum
 from numpy.typing import NDArray
-from point_layouts import on_lattice
+from point_layouts import lattice_patch, loadings, on_lattice
 
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair
@@ -32,10 +33,6 @@ def sliced_on(
     distances, norm = Distances.of(exactly, max(shape)), box.kernel(1, np.float64).norm
     places = np.add.outer(np.arange(shape[0]) * box.stride, np.arange(shape[1])).ravel()
     return box, places, distances, Sliced.of(box, distances, norm * unit / length, unit, count)
-
-
-def middle(ball: Ball) -> arb:
-    return arb(float(ball.mid.high)) + arb(float(ball.mid.low))
 
 
 def among(ball: Ball, m: int) -> arb:
@@ -70,34 +67,19 @@ def test_levels_are_exact(name: str, count: int, shape: tuple[int, int]) -> None
             assert abs(Fraction(float(levels[level][m, n])) - true) < 0.1
 
 
-LOADS = ["even", "steep", "few", "negative", "alike"]
-
-
-def loadings(kind: str, shape: tuple[int, int]) -> Pair:
-    rng = np.random.default_rng(2)
-    loads = rng.random(shape)
-    if kind == "steep":
-        loads = 10.0 ** rng.uniform(-30, 6, shape)
-    elif kind == "few":
-        loads *= rng.random(shape) < 0.03
-    elif kind == "negative":
-        loads -= 0.5
-    elif kind == "alike":  # what rounding leaves is so, too, and as much as it can
-        loads[:] = 0.5 + 2.0**-20
-    return Pair(loads.ravel(), (loads * rng.uniform(-1, 1, shape) * 2.0**-54).ravel())
-
-
 @pytest.mark.sample(6)
 @pytest.mark.parametrize(("length", "unit"), [(1.0, 0.5), (1.3e-5, 2.0**-17)])
 @pytest.mark.parametrize("name", BASES)
-@pytest.mark.parametrize("kind", LOADS)
+@pytest.mark.parametrize("loading", range(5))
 @pytest.mark.parametrize("count", [2, 3, 4])
 def test_sums_against_ball_arithmetic(
-    name: str, length: float, unit: float, kind: str, count: int
+    name: str, length: float, unit: float, loading: int, count: int
 ) -> None:
     basis, shape = np.array(BASES[name]) * length, (17, 23)
     _, places, _, sliced = sliced_on(basis, unit, shape, count)
-    loads = loadings(kind, shape)
+    rng = np.random.default_rng(2)
+    high = loadings(shape[0] * shape[1], rng)[loading]
+    loads = Pair(high, high * rng.uniform(-1, 1, len(high)) * 2.0**-54)
     found, good = sliced.sums(loads, places), {2: 1e-18, 3: 1e-22, 4: 1e-26}[count]
     with ctx.workprec(300):
         points = exact(np.stack(np.indices(shape), axis=-1).reshape(-1, 2)) @ exact(basis)
@@ -111,10 +93,7 @@ def perturbed(seed: int, count: int) -> Array:
     """Points of a lattice, off their sites by rounding and as much as is allowed."""
     rng = np.random.default_rng(seed)
     basis = np.array([[1.0, 0.1], [0.45, 0.8]]) * 1e-3
-    steps = np.arange(-9, 10)
-    sites = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
-    sites = sites[np.argsort((sites**2).sum(axis=1))][:count]
-    points = sites @ basis + rng.uniform(-1, 1, 2)
+    points = lattice_patch(basis, count) + rng.uniform(-1, 1, 2)
     return np.asarray(points * (1 + rng.choice([-1, 0, 1], points.shape) * 2.0**-53))
 
 

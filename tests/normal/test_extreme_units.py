@@ -12,12 +12,6 @@ from convexrough.scene.lattice import Lattice
 HEXAGON = cr.Asperities.hexagonal(spacing=0.25, tip_radius=1.0, within=0.5).positions
 
 
-@pytest.mark.parametrize("size", [1e-61, 1e-130, 1e-160])
-def test_coordinates_too_small(size: float) -> None:
-    with pytest.raises(cr.InputError, match=r"positions: found asperities .* at a distance of"):
-        cr.Asperities(HEXAGON * size, 1.0)
-
-
 @pytest.mark.parametrize("exponent", [-59, -70, -140])
 def test_contact_points_too_near_to_each_other(exponent: int) -> None:
     """Reached by "closest" from positions of a good size: no status, and no search without end."""

@@ -9,16 +9,7 @@ from flint import arb, ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from scenes import (
-    OPERATORS,
-    PAPER_APPROACH,
-    hexagonal,
-    on_lattice,
-    on_sphere,
-    paper,
-    random_cases,
-    scattered,
-)
+from scenes import OPERATORS, hexagonal, on_lattice, on_sphere, paper, random_cases, scattered
 
 import convexrough as cr
 from convexrough.arithmetic.balls import Ball
@@ -39,14 +30,10 @@ from convexrough.sphere import hertz
 Case = tuple[cr.Scene, float, Kind]
 
 
-def assembled(scene: cr.Scene, **control: Any) -> NormalProblem:
-    return NormalProblem.assemble(scene, **control)
-
-
 def test_screening_drops_only_those_that_cannot_touch() -> None:
     # The ring at 4 spacings lies at D = 0 to rounding, and is kept.
-    assert len(assembled(paper(), approach=PAPER_APPROACH)) == 61
-    problem = assembled(paper(), approach=1e-5)
+    assert len(NormalProblem.assemble(paper(), approach=5e-5)) == 61
+    problem = NormalProblem.assemble(paper(), approach=1e-5)
     inside = paper().asperities.distances < np.sqrt(2e-5)
     assert set(problem.candidates) == set(np.flatnonzero(inside))
 
@@ -57,13 +44,13 @@ def test_the_approach_bound_holds_for_any_weights(sampled: Case, seed: int) -> N
     """No solution carries more than an asperity would alone; no load, a higher approach."""
     scene, approach, kind = sampled
     contact = cr.press(scene, approach=approach)
-    problem = assembled(scene, approach=approach, influence=kind)
+    problem = NormalProblem.assemble(scene, approach=approach, influence=kind)
     bounds = problem.bounds(problem.approach_bound) * problem.units.force
     assert (contact.loads[problem.candidates] <= bounds).all()
     if contact.load == 0:
         return
     assert highest_approach(scene, contact.load, kind) >= approach * (1 - 1e-12)
-    problem = assembled(scene, load=contact.load, influence=kind)
+    problem = NormalProblem.assemble(scene, load=contact.load, influence=kind)
     assert set(np.flatnonzero(contact.loads)) <= set(problem.candidates)
     weights = np.random.default_rng(seed).random(len(problem)) ** 9
     bound = problem.overhang(weights, problem.plain_product(Pair.exact(weights)))
@@ -95,7 +82,7 @@ def test_every_newton_step_lowers_the_energy(make: Any, kind: Kind) -> None:
     """Also from bad starts on scenes far from convex, where full steps would not."""
     for seed in range(10):
         scene, approach = make(seed, 20, 4.0, 0.5)
-        problem = assembled(scene, approach=approach, influence=kind)
+        problem = NormalProblem.assemble(scene, approach=approach, influence=kind)
         rng = np.random.default_rng(seed)
         start = problem.bounds(problem.approach_bound) * rng.random(len(problem)) ** 3
         law = Pressing(problem, float(np.abs(problem.offsets).max()))
@@ -137,7 +124,7 @@ def test_the_bound_is_above_the_approach(rough: dict[str, Any], load: float) -> 
 
 def test_bounds_cover_all_loads_within_an_uncertain_total() -> None:
     pair = on_sphere([[-1e-3, 0.0], [1e-3, 0.0]])  # alike: the loads only scale
-    problem = assembled(pair, load=1e-8)
+    problem = NormalProblem.assemble(pair, load=1e-8)
     total: Any = problem.load
     state = refined_loads(problem, Newton().solve(problem).loads)
     box = tried(problem, state.loads.high, state.product)

@@ -40,17 +40,14 @@ def honest() -> list[Any]:
     proofs.append(lifted.proof(sheared=[SimpleNamespace(force=0.4 * lifted.load)]))
     loads = lifted.loads * (1 + 1e-3 * (np.arange(6) == 0))
     proofs.append(prove(lifted.scene, loads, load=2.96))
-    proofs += [crowded(3, 5, 1.9, 0.5).proof(), crowded(9, 6, 2.2, 0.1).proof()]
+    for sampled in ((3, 5, 1.9, 0.5), (9, 6, 2.2, 0.1)):
+        crowded, approach = scenes.scattered(*sampled)
+        proofs.append(cr.press(crowded, approach=approach).proof())
     documents = [json.loads(json.dumps(proof.document)) for proof in proofs]
     by_cholesky = deepcopy(documents[-1])
     by_cholesky["argument"] |= {"shells": None, "convexity_number": (0.999).hex()}
     documents.append(by_cholesky)
     return documents
-
-
-def crowded(*sampled: float) -> cr.Contact:
-    scene, approach = scenes.scattered(*sampled)
-    return cr.press(scene, approach=approach)
 
 
 def leaves(tree: Any, at: Place = ()) -> list[Place]:

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from scenes import MATERIAL, hexagonal, paper
+from scenes import paper
 
 import convexrough as cr
 from convexrough.scene.asperities import CUT_DEVIATIONS, largest_tip_radius
@@ -83,51 +83,3 @@ def test_random_heights_and_radii() -> None:
     assert both.tip_radii.std() / both.tip_radii.mean() == pytest.approx(0.3, rel=0.05)
     assert both.tip_radii.max() <= largest_tip_radius(2.0, 0.3)
     assert np.abs(both.heights).max() <= CUT_DEVIATIONS * 0.1
-
-
-def square(**options: Any) -> cr.Asperities:
-    return cr.Asperities.square(**({"spacing": 1, "tip_radius": 1, "within": 1} | options))
-
-
-def fine() -> cr.Scene:
-    """Memory is asked for so many before it is taken."""
-    return hexagonal(spacing=2e-5, tip_radius=1e-4)
-
-
-def one(radius: float = 1.0, **options: Any) -> cr.Scene:
-    return cr.Scene(radius, cr.Asperities([[0, 0]], 1), MATERIAL, **options)
-
-
-BAD = [
-    (lambda: cr.Material(0.0, 0.3), "contact_modulus: found 0.0, expected a positive number"),
-    (lambda: cr.Material(1.0, 0.51), "poisson_ratio: found 0.51, expected a number from 0.0 to 0"),
-    (lambda: cr.Asperities([], 1.0), "positions: found no asperity"),
-    (lambda: cr.Asperities([[0, 0, 0]], 1.0), r"positions: found shape \(1, 3\)"),
-    (lambda: cr.Asperities([[0, 0], [0, np.nan]], 1.0), r"positions\[1\]: found"),
-    (lambda: cr.Asperities([[0, 1], [2, 3], [0, 1]], 1.0),
-     r"asperities 0 and 2 \(from 0\) at a distance of 0"),
-    (lambda: square(height_std=1), "seed: found None"),
-    (lambda: cr.press(paper(), approach=1e-80), "choose other units"),
-    (lambda: cr.Asperities.hexagonal(spacing=1e-9, tip_radius=1, within=1),
-     r"within / spacing = 1e\+09: found 3.63e\+18 asperities .* memory"),
-    (lambda: one(geometry="tip"), "geometry: found 'tip'"),
-    (lambda: cr.Scene(1.0, cr.Asperities([[2, 0], [3, 0]], [1.0, 2.0]), MATERIAL),
-     "asperities 0 and 1"),
-    (lambda: cr.press(paper(), load=0.0), "load: found 0.0, expected a positive number"),
-    (lambda: cr.press(paper()), "approach, load: found neither"),
-    (lambda: cr.press(paper(), approach=1e-5, load=1e-5), "approach, load: found both"),
-    (lambda: cr.press(fine(), approach=5e-5, influence="dense"), r"could touch: found 9\.07e\+05"),
-    (lambda: cr.certify(paper(), np.zeros(61)), "exactly one of the two"),
-    (lambda: cr.certify(paper(), np.zeros(60), approach=5e-5), "expected 61 values"),
-    (lambda: cr.certify(paper(), -np.ones(61), approach=5e-5), r"loads\[0\]: found -1.0"),
-    (lambda: cr.certify(paper(), np.full(61, np.inf), approach=5e-5), r"loads\[0\]: found inf"),
-]  # fmt: skip
-
-
-@pytest.mark.sample(16)
-@pytest.mark.parametrize(("call", "message"), BAD)
-def test_bad_values(call: Any, message: str) -> None:
-    with pytest.raises(cr.InputError, match=message) as caught:
-        call()
-    assert isinstance(caught.value, ValueError)
-    assert isinstance(caught.value, cr.ConvexroughError)

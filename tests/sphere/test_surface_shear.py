@@ -1,4 +1,4 @@
-"""Surface displacements: Boussinesq's and Cerruti's integrals; tractions under shear balance."""
+"""Surface displacements: Boussinesq's and Cerruti's integrals; pressures and tractions balance."""
 
 from typing import Any
 
@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from friction_scenes import FRICTION, pressed
 from numpy.testing import assert_allclose
+from scenes import NAMED
 from scipy.integrate import dblquad, quad
 
 import convexrough as cr
@@ -73,6 +74,20 @@ def test_fields_of_each_asperity_integrate_to_its_forces(name: str, fraction: fl
     assert_allclose(forces, state.forces[touching], rtol=1e-7)
     assert_allclose(loads, contact.loads[touching], rtol=1e-7)
     assert forces.sum() == pytest.approx(state.force, rel=1e-7)
+
+
+@pytest.mark.sample(2)
+@pytest.mark.parametrize("name", NAMED)
+def test_no_pressure_outside_the_discs(name: str) -> None:
+    contact = pressed(name)
+    touching, phi = contact.loads > 0, 0.1 + 2 * np.pi * np.arange(7) / 7
+    centres, a = contact.scene.contact_points[touching], contact.contact_radii[touching]
+    circles = a[:, None, None] * np.stack((np.cos(phi), np.sin(phi)), axis=-1)
+    assert (fields.pressure(contact, centres[:, None] + (1 - 1e-6) * circles) > 0).all()
+    assert (fields.pressure(contact, centres[:, None] + (1 + 1e-6) * circles) == 0.0).all()
+    far = 10 * np.abs(contact.scene.contact_points).max()
+    assert fields.pressure(contact, [far, 0.0]) == 0.0
+    assert (fields.pressure(contact, contact.scene.contact_points[~touching]) == 0.0).all()
 
 
 @pytest.mark.parametrize("distance", [1.2, 2.0, 7.0])
