@@ -3,6 +3,7 @@
 import gzip
 import io
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -259,9 +260,8 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     **{f"a factor in a comment, {said!r}": (
         lambda case, said=said: f"# {said}\n" + lines(case.table()), "",
         f"comments: found '# {said}', expected no factor of the numbers, or --scale\n")
-       for said in ("loads x 1000", "loads * 1e3", "scale factor: 1e-3", "multiplied by 9",
-                    "loads x 1,000", "scale: .001", "factor 1 000", "multiplied by -1",
-                    "load / 1000", "divided by 100")},
+       for said in ("loads * 1e3", "loads x 1,000", "scale: .001", "factor 1 000",
+                    "multiplied by -1", "load / 1000", "divided by 100")},
     "places under other names": (lambda case: case.table("COORD1 COORD2 load"), "",
                                  "COORD1, COORD2: found positions in another order than the sc",
                                  "expected --column x=COORD1 --column y=COORD2"),
@@ -270,9 +270,6 @@ REFUSED: dict[str, tuple[Any, ...]] = {
                       "phi": np.degrees(np.arctan2(*PLACES[case.order].T[::-1])),
                       "load": case.loads[case.order]},
         "", "r, phi: found polar coordinates (in degrees) in", "expected columns x and y"),
-    "decimal commas between commas": (
-        lambda case: lines(case.table(), ",", ","), "", "rows: found up to 6 parts between commas",
-        "write decimal points, or semicolons"),
     "rounded places": (
         lambda case: case.table(x=np.round(PLACES[case.order, 0], 5)), "",
         "if they are rounded: --tolerance "),
@@ -489,21 +486,17 @@ def followed_by(total: Any) -> dict[str, Any]:
     return {name: np.round([*each, total(each)], 12) for name, each in SUMMITS.items()}
 
 
-@pytest.mark.parametrize(
-    ("factors", "said"),
-    [
-        ((-1e3, 1e3), "x has the other sign: --scale x=-0.001"),
-        ((1e6, 1e6), "10^3 times as large as the scene's, expected the scene's unit of length: "
-         "correct their units in the header"),
-    ],
-)  # fmt: skip
-def test_advice_where_headers_name_units(case: Case, factors: Any, said: str) -> None:
+def test_advice_where_headers_name_units(case: Case) -> None:
+    def placed(*factors: float) -> dict[str, Any]:
+        x, y = (PLACES[case.order] * factors).T
+        return {"x [mm]": x, "y [mm]": y, "load": case.loads[case.order]}
+
     write_scene(units=CONVERT)
-    x, y = (PLACES[case.order] * factors).T
-    columns = {"x [mm]": x, "y [mm]": y, "load": case.loads[case.order]}
-    assert case.verify(columns).refuses(said)
-    if "--scale" in said:
-        assert case.verify(columns, *said.split()[-2:]).status == 0
+    said = "10^3 times as large as the scene's, expected the scene's unit of length: correct "
+    assert case.verify(placed(1e6, 1e6)).refuses(f"{said}their units in the header")
+    mirrored = placed(-1e3, 1e3)
+    assert case.verify(mirrored).refuses("x has the other sign: --scale x=-0.001")
+    assert case.verify(mirrored, "--scale", "x=-0.001").status == 0
 
 
 def test_units_convert_when_asked(case: Case) -> None:
@@ -581,20 +574,17 @@ def test_the_modulus_is_said(case: Case) -> None:
     assert " mN\n" in outcome.out
 
 
-@pytest.mark.parametrize(
-    ("modulus", "more", "said"),
-    [
-        ("210e3", "", ("softer than rubber", " Pa): ")),
-        ("5e12", "", ("above", " Pa): ")),
-        ("210e9", "\n[friction]\ncoefficient = 30",
-         ("the coefficient of friction is 30: few pairs of bodies exceed 2; it is",)),
-    ],
-)  # fmt: skip
-def test_what_is_unlikely_is_told(case: Case, modulus: str, more: str, said: Any) -> None:
-    write_scene(f"youngs_modulus = {modulus}", METRES + more)
-    outcome = case.command("run", "scene.toml", "--no-figures")
-    assert outcome.status == 0
-    assert all(each in outcome.err for each in said)
+def test_what_is_unlikely_is_told(case: Case) -> None:
+    few = "the coefficient of friction is 30: few pairs of bodies exceed 2; it is"
+    for modulus, more, said in (
+        ("210e3", "", r" Pa\): softer than rubber"),
+        ("5e12", "", r" Pa\): above"),
+        ("210e9", "\n[friction]\ncoefficient = 30", few),
+    ):
+        write_scene(f"youngs_modulus = {modulus}", METRES + more)
+        outcome = case.command("run", "scene.toml", "--no-figures", "--force")
+        assert outcome.status == 0
+        assert re.search(said, outcome.err)
 
 
 # What else is read, and said

@@ -1,7 +1,6 @@
 """Tables as people have them: read where the meaning is certain, else every mistake is shown."""
 
 import sys
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -68,38 +67,30 @@ def test_as_people_have_them(tmp_path: Path, content: str | bytes) -> None:
     assert read(tmp_path, content).values.tolist() == LOADS
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
+def test_unknown_statuses_are_named(tmp_path: Path) -> None:
+    """The loads decide; a user sees what her code calls what."""
+    for words, said in (
         ("CCO", "column status not compared (C or O with a load, C without)"),
         (("contact", "open", "touches"), "(touches with a load, nothing without)"),
         (("Closed", "OPEN", "undecided"), ""),
-    ],
-)
-def test_unknown_statuses_are_named(tmp_path: Path, words: Sequence[str], said: str) -> None:
-    """The loads decide; a user sees what her code calls what."""
-    found = read(tmp_path, {"load": LOADS, "status": list(words)})
-    assert said in found.note
-    assert any(said in line for line in found.explained)
-    assert ("not compared" in found.note) == bool(said)
+    ):
+        found = read(tmp_path, {"load": LOADS, "status": list(words)})
+        assert said in found.note
+        assert any(said in line for line in found.explained)
+        assert ("not compared" in found.note) == bool(said)
 
 
-@pytest.mark.parametrize(
-    ("column", "values", "same"),
-    [
+def test_heights_and_radii_of_another_scene_are_told(tmp_path: Path) -> None:
+    """A unit is not converted here: such a column is not compared."""
+    for column, values, same in (
         ("height", (0, 0, 1e-9), False),
         ("tip_radius [m]", (0.1, 0.2, 0.1), True),
         ("Tip_radius", (0.1, 0.2, 0.1), False),
         ("tip_radius", (0.1, 0.1004, 0.1), True),
-    ],
-)
-def test_heights_and_radii_of_another_scene_are_told(
-    tmp_path: Path, column: str, values: Sequence[float], same: bool
-) -> None:
-    """A unit is not converted here: such a column is not compared."""
-    found = read(tmp_path, {"load": LOADS, column: values})
-    said = f"column {column.lower()} differs from the scene's: loads of another scene?"
-    assert (said in found.note) == (not same)
+    ):
+        found = read(tmp_path, {"load": LOADS, column: values})
+        said = f"column {column.lower()} differs from the scene's: loads of another scene?"
+        assert (said in found.note) == (not same)
 
 
 def test_a_line_of_numbers(tmp_path: Path) -> None:
