@@ -72,17 +72,14 @@ def test_discs_have_the_radii_of_the_state() -> None:
     assert_allclose(lines["sliding"].get_facecolor(), [to_rgba(SLIDING)])
 
 
-def doubted(state: cr.ShearState, scope: Any, count: int) -> cr.ShearState:
-    """The state with doubt cast on the last of its touching asperities."""
-    status = state.status.copy()
-    status[np.flatnonzero(state.contact.loads)[-count:]] = "undecided"
-    certificate = dataclasses.replace(state.certificate, scope=scope, status=status)
-    return dataclasses.replace(state, certificate=certificate)
-
-
 @pytest.mark.parametrize(("scope", "count"), [("global", 4), ("none", 37)])
-def test_doubt_is_marked(scope: str, count: int) -> None:
-    state = doubted(states("paper", [0.5])[0], scope, count)
+def test_doubt_is_marked(scope: Any, count: int) -> None:
+    """Of the last of the asperities that touch."""
+    (sure,) = states("paper", [0.5])
+    status = sure.status.copy()
+    status[np.flatnonzero(sure.contact.loads)[-count:]] = "undecided"
+    certificate = dataclasses.replace(sure.certificate, scope=scope, status=status)
+    state = dataclasses.replace(sure, certificate=certificate)
     (axes,) = plots.shear_figures([state])["stick_slip"].axes
     (marks,) = [line for line in axes.lines if line.get_marker() == "x"]
     assert len(np.asarray(marks.get_xdata())) == discs(axes, "undecided") == count
