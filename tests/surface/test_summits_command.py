@@ -83,9 +83,7 @@ def test_pressed_as_a_scene_says(find: Any) -> None:
     contact = cr.press(file.scene, load=file.load)
     chosen = next(row for row in found["provability"] if row["prune"] == 0.05)
     assert chosen["contacts"] == (contact.status == "contact").sum()
-    assert chosen["scope"] == contact.certificate.scope
     assert_allclose(chosen["approach"], contact.approach, rtol=1e-9)
-    assert_allclose(chosen["crowding"], contact.crowding, rtol=1e-9)
     assert found["crowded"] == []
     first = found["trusted_from"]
     later = [row for row in found["provability"] if row["prune"] >= first]
