@@ -270,6 +270,9 @@ REFUSED: dict[str, tuple[Any, ...]] = {
                       "phi": np.degrees(np.arctan2(*PLACES[case.order].T[::-1])),
                       "load": case.loads[case.order]},
         "", "r, phi: found polar coordinates (in degrees) in", "expected columns x and y"),
+    "decimal commas between commas": (
+        lambda case: lines(case.table(), ",", ","), "", "rows: found up to 6 parts between commas",
+        "write decimal points, or semicolons"),
     "rounded places": (
         lambda case: case.table(x=np.round(PLACES[case.order, 0], 5)), "",
         "if they are rounded: --tolerance "),
@@ -290,9 +293,6 @@ REFUSED: dict[str, tuple[Any, ...]] = {
         lambda case: {name: [*each, each[0] * 0.0 if "area" in name else each[0]]
                       for name, each in tributary(case).items()},
         "", "column area: found 0, expected a positive number"),
-    "nodes mirrored, each near some asperity all the same": (
-        lambda case: patches(case) | {"x": -patches(case)["x"]}, "a.csv --nodes",
-        "x has the other sign: --scale x=-1"),
     "columns that differ in case": (lambda case: case.table(Load=case.loads), "",
                                     "found 'load' and 'Load', expected one of them: --column"),
     "a load at a site that the scene lacks": (

@@ -271,6 +271,7 @@ def test_summits_without_a_header(tmp_path: Path) -> None:
         ("x,y,heigth\n0,0,0\n", "found 'heigth', expected a known column; did you mean \"height\""),
         ("x,height\n0,0\n", "columns: found x, height, expected a column 'y'"),
         ("x,y,x\n0,0,0\n", "columns: found 'x' twice, expected once"),
+        ("x,y\n0,0\n1,2,3\n", "row 3: found 3 cells, expected 2, as in the header: 1,2,3"),
         ('x,y\n0,"1\n', 'row 2: found quotes that do not end on this line: 0,"1'),
         ("x,y\n0,1_000\n", "row 2, column y: found '1_000', expected a finite number"),
         ("x,y,tip_radius\n0,0,1\n", "tip radii: found both"),
