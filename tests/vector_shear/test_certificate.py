@@ -17,7 +17,7 @@ from convexrough.vector_shear.certificate import certify_vectors
 from convexrough.vector_shear.problem import FrictionProblem, VectorState
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     st.sampled_from(["paper", "rough"]),
     st.floats(1e-6, 0.999),
