@@ -1,18 +1,12 @@
 """Sweeps that several tests compute, and what it means that two tables are the same."""
 
 import json
-import os
-import signal
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 import convexrough as cr
-from convexrough.run.scene_file import Task
-from convexrough.sweeps.batch import Tables
 
 SMALL: dict[str, Any] = {
     "sphere": {"radius": 1.0},
@@ -84,20 +78,3 @@ def _equal(one: Any, other: Any) -> bool:
 def numbers(table: cr.SweepTable, *names: str) -> list[Any]:
     columns = table.read(names)
     return [np.asarray(columns[name]).tolist() for name in names]
-
-
-@dataclass(frozen=True)
-class Deadly(Tables):
-    """Scenes of which one kills the process that computes it."""
-
-    worst: int = 0
-
-    def opened(self) -> Callable[[int], Task]:
-        ask = super().opened()
-
-        def ask_one(number: int) -> Task:
-            if number == self.worst:
-                os.kill(os.getpid(), signal.SIGKILL)
-            return ask(number)
-
-        return ask_one

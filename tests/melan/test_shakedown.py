@@ -60,22 +60,13 @@ def test_exact_limits_at_constant_load() -> None:
     assert np.flatnonzero(found.mechanism > 0.5).tolist() == list(range(31, 37))
 
 
-@pytest.mark.sample(1)
-@pytest.mark.parametrize(
-    ("angle", "a", "b"),
-    [
-        (0, 1.250804608223, 2.566569395968),
-        (45, 1.309538047714, 2.687086579329),
-        (90, 1.398442065278, 2.869511819177),
-    ],
-)
-def test_exact_limits_around_ellipses(angle: float, a: float, b: float) -> None:
-    p, q = turned(angle)
+def test_exact_limits_around_an_ellipse() -> None:
+    p, q = turned(45)
     found = cr.shakedown(PAPER, load=0.9 * P, load_amplitudes=p, force_amplitudes=q)
-    assert found.factor == pytest.approx(a, rel=1e-11)
-    assert found.factors[B] == pytest.approx(b, rel=1e-11)
-    assert found.lower <= a * (1 + 1e-12)
-    assert found.upper >= a * (1 - 1e-12)
+    assert found.factor == pytest.approx(1.309538047714, rel=1e-11)
+    assert found.factors[B] == pytest.approx(2.687086579329, rel=1e-11)
+    assert found.lower <= 1.309538047714 * (1 + 1e-12)
+    assert found.upper >= 1.309538047714 * (1 - 1e-12)
 
 
 @pytest.mark.sample(1)

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Page, sync_playwright
 
 import convexrough as cr
 from convexrough.paper import example
@@ -64,14 +64,6 @@ def test_states_are_those_of_shear_and_cycle(contact: cr.Contact, page: str) -> 
         assert codes[part] / 1000 == pytest.approx(stuck[part], abs=6e-4)
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with sync_playwright() as player:
-        running = player.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
-        yield running
-        running.close()
-
-
 class Opened(NamedTuple):
     """A page in the browser."""
 
@@ -90,22 +82,23 @@ class Opened(NamedTuple):
 
 
 @pytest.fixture
-def opened(browser: Browser, page: str, tmp_path: Path) -> Iterator[Opened]:
+def opened(page: str, tmp_path: Path) -> Iterator[Opened]:
     """The page, which follows asperity 36, asks for nothing, and complains of nothing."""
     file, asked, complaints = tmp_path / "slider.html", [], []
     file.write_text(page, encoding="utf-8")
-    context = browser.new_context(viewport={"width": 1400, "height": 900})
-    context.set_default_timeout(5000)
-    shown = context.new_page()
-    shown.on("request", lambda request: asked.append(request.url))
-    shown.on("console", lambda message: complaints.append(message.text))
-    shown.on("pageerror", lambda error: complaints.append(str(error)))
-    shown.goto(file.as_uri())
-    options = shown.locator("#follow option").all_inner_texts()
-    (label,) = [option for option in options if option.startswith("36:")]
-    shown.locator("#follow").select_option(label=label)
-    yield Opened(shown)
-    context.close()
+    with sync_playwright() as player:
+        browser = player.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
+        shown = browser.new_page(viewport={"width": 1400, "height": 900})
+        shown.set_default_timeout(5000)
+        shown.on("request", lambda request: asked.append(request.url))
+        shown.on("console", lambda message: complaints.append(message.text))
+        shown.on("pageerror", lambda error: complaints.append(str(error)))
+        shown.goto(file.as_uri())
+        options = shown.locator("#follow option").all_inner_texts()
+        (label,) = [option for option in options if option.startswith("36:")]
+        shown.locator("#follow").select_option(label=label)
+        yield Opened(shown)
+        browser.close()
     assert (asked, complaints) == ([file.as_uri()], [])
 
 

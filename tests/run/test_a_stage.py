@@ -41,14 +41,11 @@ def test_it_is_computed_written_and_printed(run: Any) -> None:
     assert list(result.to_dataframe()["onset"]) == pytest.approx(onsets, nan_ok=True)
 
 
-@pytest.mark.parametrize(
-    ("more", "said"),
-    [
+def test_its_mistakes_are_told(run: Any) -> None:
+    for more, said in (
         (MORE + "quantils = [1]", '[onset] quantils: unknown key, did you mean "quantiles"?'),
         (MORE + "quantiles = [2.0]", "[onset] quantiles[0]: found 2.0, expected a number from 0"),
         (MORE.replace("onset", "onst"), '[onst]: unknown table, did you mean "onset"?'),
         ("[onset]", "[friction]: missing table, needed with [onset]"),
-    ],
-)
-def test_its_mistakes_are_told(run: Any, more: str, said: str) -> None:
-    assert run(scene_text(more=more)).refuses(said)
+    ):
+        assert run(scene_text(more=more)).refuses(said)

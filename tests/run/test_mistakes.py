@@ -143,8 +143,6 @@ def test_all_mistakes_are_told_at_once(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("wrong", "meant", "why"),
     [
-        ("spacing = 0,0025", "spacing = 0.0025", "a decimal point"),
-        ("spacing = 0.0025 m", "spacing = 0.0025", "without unit"),
         ("spacing = 2.5D-3", "spacing = 2.5e-3", "exponent"),
         ("spacing = .0025", "spacing = 0.0025", "both sides"),
         ("spacing: 0.0025", "spacing = 0.0025", "equals sign"),
@@ -164,14 +162,9 @@ def test_a_slip(tmp_path: Path, wrong: str, meant: str, why: str) -> None:
     assert why in line
 
 
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        "spacing = 1\nspacing = 2e-3",
-        *(f"spacing = {it}" for it in ("5*10^-5", "1/400", "5e+-5", "5e\u22125")),
-    ],
-)
-def test_no_number_is_invented(tmp_path: Path, wrong: str) -> None:
+@pytest.mark.parametrize("number", ["1\nspacing = 2e-3", "5*10^-5", "1/400", "5e+-5", "5e\u22125"])
+def test_no_number_is_invented(tmp_path: Path, number: str) -> None:
+    wrong = f"spacing = {number}"
     text = scene_text('pattern = "hexagonal"\n' + wrong)
     (line,) = refused(tmp_path, text)
     last = wrong.split("\n")[-1]
@@ -202,5 +195,6 @@ def test_all_slips_at_once(tmp_path: Path) -> None:
     why = "a decimal point instead of a comma"
     assert first == f"line 2: found radius = 1,0, expected radius = 1.0: {why}"
     assert second.startswith("line 4: found approach = 5e-5 m, expected approach = 5e-5: ")
+    assert "without unit" in second
     assert last.startswith("not a TOML file: ")
     assert last.endswith("(at line 6, column 13): coefficient 0.5")

@@ -28,10 +28,6 @@ def edited(
     return replace(whole, asperities=some)
 
 
-def middle_free(whole: cr.Scene) -> cr.Scene:
-    return edited(whole, kept=np.hypot(*(whole.asperities.positions - [0.003, 0.001]).T) > 0.002)
-
-
 def sparse(whole: cr.Scene) -> cr.Scene:
     rng = np.random.default_rng(5)
     near = whole.asperities.distances < 3e-3  # where a lattice is looked for
@@ -49,10 +45,8 @@ SCENES = {
     "rough": scene(6, height_std=1e-6, tip_radius_cv=0.1, seed=2),
     "closest": replace(scene(6, height_std=1e-6, seed=3), geometry="closest"),
     "screened": scene(6, within=0.02, height_std=1e-7, seed=4),
-    "hole": middle_free(scene(7)),
     "sparse": sparse(scene(7, height_std=1e-7, seed=4)),
-    "scattered": scattered(scene(6)),
-    "scattered heights": scattered(scene(6, height_std=1e-6, seed=2)),
+    "scattered": scattered(scene(6, height_std=1e-6, seed=2)),
 }
 
 

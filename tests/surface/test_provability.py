@@ -1,5 +1,7 @@
 """How strongly to prune: the curve, what trust needs, and the figures of a surface."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from figure_checks import discs, fits, texts
@@ -39,34 +41,34 @@ def test_each_level_is_a_press(caplog: pytest.LogCaptureFixture) -> None:
             assert curve.undecided[i] == 0
 
 
-def test_what_trust_needs() -> None:
+def curve_of(**changed: Any) -> Provability:
+    """One that is to be trusted, but for what is changed."""
     good = dict(prune=0.1, heights=0.1, summits=9, contacts=5, undecided=0, scope="global",
                 crowding=0.999, model_error=0.0499, approaches=1.0, loads=1.0)  # fmt: skip
+    size = np.shape(changed.get("prune", [0.1]))
+    return Provability(**{name: np.resize(it, size) for name, it in (good | changed).items()})
+
+
+def test_what_trust_needs() -> None:
     fine = {}, {"scope": "local"}
     wrong = ({"contacts": 4}, {"scope": "none"}, {"undecided": 1}, {"crowding": 1.001},
              {"model_error": 0.0501}, {"crowding": np.nan})  # fmt: skip
     for change in (*fine, *wrong):
-        trusted = change in fine
-        curve = Provability(**{name: np.array([it]) for name, it in (good | change).items()})
+        trusted, curve = change in fine, curve_of(**change)
         assert (curve.trusted.tolist(), curve.trusted_from == 0.1) == ([trusted], trusted)
 
 
 def test_prunings_that_leave_few_contacts_are_not_advised() -> None:
     """Neither alone, on a crowded map, nor as a reason to doubt weaker prunings."""
     for crowding, first in (([1.2, 1.1, 0.1, 0.0], np.nan), ([1.2, 0.9, 0.1, 0.0], 0.1)):
-        size = np.ones(4)
-        curve = Provability(
-            prune=np.array([0.0, 0.1, 0.3, 0.5]), heights=size, summits=np.array([90, 40, 4, 1]),
-            contacts=np.array([30, 20, 4, 1]), undecided=0 * size, scope=np.full(4, "global"),
-            crowding=np.array(crowding), model_error=0 * size, approaches=size, loads=size,
-        )  # fmt: skip
+        curve = curve_of(prune=[0.0, 0.1, 0.3, 0.5], contacts=[30, 20, 4, 1], crowding=crowding)
         assert_allclose(curve.trusted_from, first)
         assert curve.doubts[0] == "discs overlap"
         assert curve.doubts[-1] == "fewer than 5 contacts"
 
 
-def said(figure: object) -> set[str]:
-    return {text.get_text() for text in texts(figure)}  # type: ignore[arg-type]
+def said(figure: Any) -> set[str]:
+    return {text.get_text() for text in texts(figure)}
 
 
 @pytest.mark.sample(1)

@@ -77,15 +77,13 @@ def test_a_scan_becomes_a_scene(command: Any) -> None:
 @pytest.mark.usefixtures("surface")
 def test_pressed_as_a_scene_says(find: Any) -> None:
     outcome = find("scan.npz", "--scene", "scene.toml", "--json")
-    assert outcome.status == 0
+    assert (outcome.status, "reads" in outcome.err) == (0, False)
     found = json.loads(outcome.out)
     file = cr.read_scene("scene.toml")  # of the table that was just written
     contact = cr.press(file.scene, load=file.load)
     chosen = next(row for row in found["provability"] if row["prune"] == 0.05)
     assert chosen["contacts"] == (contact.status == "contact").sum()
-    assert chosen["scope"] == contact.certificate.scope
     assert_allclose(chosen["approach"], contact.approach, rtol=1e-9)
-    assert_allclose(chosen["crowding"], contact.crowding, rtol=1e-9)
     assert found["crowded"] == []
     first = found["trusted_from"]
     later = [row for row in found["provability"] if row["prune"] >= first]
@@ -93,6 +91,9 @@ def test_pressed_as_a_scene_says(find: Any) -> None:
     assert rows("scan-summits/provability.csv")[0]["prune"] == "0.0"
     assert json.loads(Path("scan-summits/summary.json").read_text()) == found
     assert json.loads(find("scan.npz", *PRESSED, "--load", "100", "--json").out) == found
+    elsewhere = find("scan.npz", "--scene", "scene.toml", "--out", "other").err
+    table = Path("other", "summits.csv")
+    assert f"scene.toml reads scan-summits/summits.csv, which is not {table}" in elsewhere
 
 
 @pytest.mark.usefixtures("surface")
@@ -143,14 +144,6 @@ def test_a_long_table_is_written_as_npz(command: Any, monkeypatch: pytest.Monkey
     assert len(columns["height [µm]"]) == len(columns["deviation [µm]"]) > 3
 
 
-@pytest.mark.usefixtures("surface")
-def test_a_scene_that_reads_another_table_is_named(find: Any) -> None:
-    assert "reads" not in find("scan.npz", "--scene", "scene.toml").err
-    said = find("scan.npz", "--scene", "scene.toml", "--out", "other").err
-    table = Path("other", "summits.csv")
-    assert f"scene.toml reads scan-summits/summits.csv, which is not {table}" in said
-
-
 def test_summits_on_filled_pixels_are_counted(find: Any, surface: cr.surface.Surface) -> None:
     heights = np.array(surface.heights)
     row, column = surface.summits().pixels[0]
@@ -166,7 +159,6 @@ def test_summits_on_filled_pixels_are_counted(find: Any, surface: cr.surface.Sur
     ("arguments", "message"),
     [
         (("missing.npy",), "missing.npy: cannot be read: No such file"),
-        (("bare.npy",), "bare.npy: pixel: found none, expected its size, which the file does not"),
         (("bare.npy", "--pixel", "one"), "--pixel: found 'one', expected a number, or two"),
         (("bare.npy", "--pixel", "-1"), "pixel: found -1.0, expected a positive number"),
         (("bare.npy", "--pixel", "1", "--fit", "99"), "found 40 by 30 pixels, expected at"),

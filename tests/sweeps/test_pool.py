@@ -7,19 +7,18 @@ import random
 import signal
 from collections.abc import Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
-from dataclasses import replace
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import Any
 
 import pytest
-from sweep_files import Deadly, same, sweeping, swept, tables
+from sweep_files import same, sweeping, swept, tables
 
 import convexrough as cr
 from convexrough.progress import logged
 from convexrough.sweeps import plan
-from convexrough.sweeps.batch import Tables
-from convexrough.sweeps.plan import Plan, plan_of
-from convexrough.sweeps.sweep import Processes, dask, run
+from convexrough.sweeps.plan import plan_of
+from convexrough.sweeps.sweep import dask, run
 
 #: Whatever ran before in this process, and whichever threads it left, nothing is forked.
 SPAWN = multiprocessing.get_context("spawn")
@@ -71,26 +70,34 @@ def test_batches(most: int, influence: str, monkeypatch: pytest.MonkeyPatch) -> 
     assert same(batches, whole)
 
 
-def deadly(whole: Plan, worst: int) -> Plan:
-    assert isinstance(whole.source, Tables)
-    return replace(whole, source=Deadly(**vars(whole.source), worst=worst))
+class Dying(Executor):
+    """Computes here. A batch with scene 17 kills its process, after which none may compute."""
+
+    def __init__(self, *, replaced: bool) -> None:
+        self.replaced, self.dead = replaced, False
+
+    def submit(self, function: Any, /, *arguments: Any, **keys: Any) -> Future[Any]:
+        if self.dead and not self.replaced:
+            raise BrokenProcessPool("a process died")
+        future: Future[Any] = Future()
+        if 17 in arguments[0].numbers:
+            self.dead = True
+            future.set_exception(BrokenProcessPool("a process died"))
+        else:
+            future.set_result(function(*arguments))
+        return future
 
 
-@pytest.mark.sample(0)  # five processes: with --full; test_faults.py kills some every time
 def test_a_scene_that_kills_costs_its_batch_and_is_named(tmp_path: Path) -> None:
-    """It breaks the executor of a user, which is said."""
+    """It breaks an executor that replaces no processes, which is said."""
     contents = sweeping(seeds=24, over={"asperities.height_std": [1e-6]})
-    whole = plan_of(contents, Path("sweep"))
     said = "the process that computed scenes 17 to 17 died twice"
-    with Processes(1) as mine, pytest.raises(cr.WorkerError, match=said):
-        run(deadly(whole, 17), mine, out=tmp_path / "a")
+    with pytest.raises(cr.WorkerError, match=said):
+        cr.sweep(contents, executor=Dying(replaced=True), out=tmp_path / "a")
     assert cr.open_sweep(tmp_path / "a").read()["scene"].tolist() == [*range(17), *range(18, 24)]
-    with ThreadPoolExecutor(1) as here:
-        table = run(whole, here, out=tmp_path / "a", resume=True)[0]
-    assert same(table, swept(contents))
-    broken = pytest.raises(cr.WorkerError, match="executor is broken")
-    with ProcessPoolExecutor(1, mp_context=SPAWN) as theirs, broken:
-        run(deadly(PLAN, 3), theirs)
+    assert same(swept(contents, out=tmp_path / "a", resume=True), swept(contents))
+    with pytest.raises(cr.WorkerError, match="executor is broken"):
+        cr.sweep(contents, executor=Dying(replaced=False))
 
 
 def test_threads_of_linear_algebra_do_not_matter() -> None:

@@ -150,26 +150,23 @@ HELD = {"gradient.holding": ["load", "approach"]}
 GROSS = "no gradient of the loss exists for this scene: [gradient] fraction: found 1, a force of"
 
 
-@pytest.mark.parametrize(
-    ("measure", "values", "fraction", "said"),
-    [
+def test_a_missing_number_is_nan() -> None:
+    for measure, values, fraction, said in (
         ("closest_change", {"asperities.geometry": ["summit", "closest"]}, 0.5, ""),
         ("gradient.by.sphere_radius", {"sphere.radius": [1.0, [1.0, 2.0]]}, 0.5, ""),
         ("gradient.by.load", HELD, 0.5, ""),
         ("gradient.by.friction", HELD, 1.0, GROSS),
         ("phase_losses.loss", {"steady.phases": [[0.0, 1.0], [0.5]]}, 0.5, ""),
-    ],
-)
-def test_a_missing_number_is_nan(measure: str, values: Any, fraction: float, said: str) -> None:
-    contents = sweeping(measure=["contact", measure], over=values)
-    contents["gradient"] = {"of": "loss", "fraction": fraction}
-    table = swept(contents | {"steady": {"ellipse": ELLIPSE}})
-    status, message, last = numbers(table, "status", "message", table.measured[-1])
-    assert status == ["certified", "undecided" if said else "certified"]
-    assert said in message[1]
-    assert np.isnan(last).tolist() == [False, True]
-    assert not np.isnan(table.read(["contact"])["contact"]).any()
-    assert not said or table.quantiles([measure])["0.05"][0] == -np.inf
+    ):
+        contents = sweeping(measure=["contact", measure], over=values)
+        contents["gradient"] = {"of": "loss", "fraction": fraction}
+        table = swept(contents | {"steady": {"ellipse": ELLIPSE}})
+        status, message, last = numbers(table, "status", "message", table.measured[-1])
+        assert status == ["certified", "undecided" if said else "certified"]
+        assert said in message[1]
+        assert np.isnan(last).tolist() == [False, True], measure
+        assert not np.isnan(table.read(["contact"])["contact"]).any()
+        assert not said or table.quantiles([measure])["0.05"][0] == -np.inf
 
 
 def test_a_figure_says_what_a_band_pools() -> None:
@@ -179,21 +176,18 @@ def test_a_figure_says_what_a_band_pools() -> None:
     assert "all load, coefficient: 6 combinations" in legend.get_texts()[0].get_text()
 
 
-@pytest.mark.parametrize(
-    ("call", "said"),
-    [
-        (lambda table: table.quantiles(at=[1.5]), r"at\[0\]: found 1.5, expected a number from 0"),
-        (lambda table: table.quantiles(at="a"), "at: found 'a', expected a list of quantiles"),
-        (lambda table: table.read("load"), "columns: found 'load', expected a list of names"),
-        (lambda _: swept([paper()], load=1e-7, cycle=[(0.5, 0.1)], measure=["loss"]), "cycle: "),
-        (lambda _: swept(SMALL, resume=True), "out: found none, expected the folder of"),
-        (lambda _: swept(SMALL, out="b", resume=True, overwrite=True), "overwrite: found both"),
-        (lambda _: cr.open_sweep("x" * 300), "cannot be read: File name too long"),
-    ],
-)
-def test_what_is_refused(whole: cr.SweepTable, call: Any, said: str) -> None:
-    with pytest.raises((cr.InputError, cr.FileError), match=said):
-        call(whole)
+def test_what_is_refused(whole: cr.SweepTable) -> None:
+    for call, said in (
+        (lambda: whole.quantiles(at=[1.5]), r"at\[0\]: found 1.5, expected a number from 0"),
+        (lambda: whole.quantiles(at="a"), "at: found 'a', expected a list of quantiles"),
+        (lambda: whole.read("load"), "columns: found 'load', expected a list of names"),
+        (lambda: swept([paper()], load=1e-7, cycle=[(0.5, 0.1)], measure=["loss"]), "cycle: "),
+        (lambda: swept(SMALL, resume=True), "out: found none, expected the folder of"),
+        (lambda: swept(SMALL, out="b", resume=True, overwrite=True), "overwrite: found both"),
+        (lambda: cr.open_sweep("x" * 300), "cannot be read: File name too long"),
+    ):
+        with pytest.raises((cr.InputError, cr.FileError), match=said):
+            call()
 
 
 def test_what_is_not_proved_is_said() -> None:

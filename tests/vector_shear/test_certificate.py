@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from attacks import ATTACKS, attack
 from friction_scenes import FRICTION, VECTOR_NAMES, found, in_doubt, lengths, pressed, with_friction
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -16,11 +17,11 @@ from convexrough.vector_shear.certificate import certify_vectors
 from convexrough.vector_shear.problem import FrictionProblem, VectorState
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     st.sampled_from(["paper", "rough"]),
     st.floats(1e-6, 0.999),
-    st.sampled_from(["swap", "perturb", "turn", "drop", "zero", "displacement", "slip"]),
+    st.sampled_from([*ATTACKS, "turn", "displacement", "slip"]),
     st.integers(0, 2**32 - 1),
 )
 def test_attacks_on_the_statuses(name: str, fraction: float, kind: str, seed: int) -> None:
@@ -30,21 +31,14 @@ def test_attacks_on_the_statuses(name: str, fraction: float, kind: str, seed: in
     total = np.array([0.8, 0.6]) * fraction * problem.loads.sum()
     good = FrictionNewton().solve(problem, total)
     rng = np.random.default_rng(seed)
-    q, displacement, slips = good.increments.copy(), good.displacement, good.slips.copy()
-    size, (i, j) = 10.0 ** rng.uniform(-14, -1), rng.integers(len(q), size=2)
-    if kind == "swap":
-        q[[i, j]] = q[[j, i]]
-    elif kind == "perturb":
-        q *= 1 + size * rng.standard_normal(q.shape)
-    elif kind == "turn":
+    displacement, slips = good.displacement, good.slips.copy()
+    sizes, size = lengths(good.increments), 10.0 ** rng.uniform(-14, -1)
+    q = good.increments * (attack(kind, sizes, rng) / sizes)[:, None]
+    if kind == "turn":
         q += size * rng.standard_normal((len(q), 1)) * q[:, ::-1] * [-1, 1]
-    elif kind == "drop":
-        q[i] = 0.0
-    elif kind == "zero":
-        q[:] = 0.0
     elif kind == "slip":
-        slips[i] += size * displacement
-    else:
+        slips[rng.integers(len(slips))] += size * displacement
+    elif kind == "displacement":
         displacement = displacement * (1 + size * rng.standard_normal(2))
     q /= np.maximum(lengths(q) / problem.loads, 1.0)[:, None]
     wrong = good._replace(increments=q, displacement=displacement, slips=slips)
@@ -122,14 +116,15 @@ def test_the_last_one_is_proved_to_stick(count: int, fraction: float) -> None:
     assert (state.status == "sliding").sum() == (contact.loads > 0).sum() - 1
 
 
-@pytest.mark.sample(1)
-@pytest.mark.parametrize("nu", [0.02, 0.1, 0.3, 0.5])
-def test_the_last_one_is_not_said_to_stick_where_all_slide(nu: float) -> None:
-    """With it forces turn, and all slide a little below f P: nobody may be said to stick there."""
+def test_the_last_one_is_not_said_to_stick_where_all_slide() -> None:
+    """With it forces turn, and all slide a little below f P: nobody may be said to stick there.
+
+    Forces that turn as little as here come nearest to a wrong word.
+    """
     all_slide = 0
     for seed in range(4):
         scene, approach = scattered(seed, 2 + seed % 3, 0.6, 0.3)
-        contact = cr.press(with_friction(scene, nu=nu), approach=approach)
+        contact = cr.press(with_friction(scene, nu=0.02), approach=approach)
         for missing in 10.0 ** np.arange(-12, -2, 1.0):
             force = (1 - missing) * FRICTION * contact.load
             try:

@@ -1,33 +1,46 @@
-"""Figures of shear, cycles, paths and the paper say what the states say; nothing collides."""
+"""The figures say what contacts and states say, and nothing in them collides."""
 
 import dataclasses
+import re
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from figure_checks import discs, fits, texts
 from matplotlib.colors import to_rgba
+from matplotlib.figure import Figure
 from numpy.testing import assert_allclose
 from path_scenes import LARGEST, ONE, PAPER, follow
-from scenes import PAPER_APPROACH, on_sphere, paper, rough
+from scenes import PAPER_APPROACH, hexagonal, on_sphere, paper, rough, steel
 
 import convexrough as cr
-from convexrough import plots
+from convexrough import fields, plots
 from convexrough.paper.example import PaperStates
 from convexrough.paper.figures import paper_figures
 from convexrough.plots.asperity_map import LOOKS, SLIDING
 from convexrough.sphere.smooth import smooth
 
-SCENES = {"paper": paper(), "rough": rough(), "one": on_sphere([[0.0, 0.0]]), "nothing": paper()}
+#: Scenes and what is prescribed, if not the approach of the paper.
+CASES: dict[str, tuple[cr.Scene, dict[str, float]]] = {
+    "one": (on_sphere([[0.0, 0.0]]), {}),
+    "three": (on_sphere([[0, 0], [3e-3, 0], [-1e-3, 2.5e-3]]), {}),
+    "paper": (paper(), {}),
+    "rough": (rough(), {}),
+    "steel": (steel(), {"approach": 0.5e-6}),
+    "2200": (hexagonal(3e-4, tip_radius=2.4e-3, within=8.5e-3), {"load": 4.5e-7}),
+    "4000": (hexagonal(2.2e-4, tip_radius=1.76e-3, within=8.5e-3), {"load": 4.5e-7}),
+    "nothing": (paper(), {"approach": -1e-6}),
+}
 
 
 @cache
 def contact(name: str) -> cr.Contact:
     bare, *named = name.split(" in ")
-    units = ("µm", "mN") if named else ("", "")
-    scene = dataclasses.replace(SCENES[bare], friction=0.5, units=units)
-    return cr.press(scene, approach=-1e-6 if bare == "nothing" else PAPER_APPROACH)
+    scene, control = CASES[bare]
+    scene = dataclasses.replace(scene, friction=0.5, units=("µm", "mN") if named else ("", ""))
+    return cr.press(scene, **(control or {"approach": PAPER_APPROACH}))
 
 
 def limit(name: str) -> float:
@@ -42,13 +55,24 @@ def past(name: str, shares: Any) -> cr.LoadPath:
     return cr.history(contact(name), forces=np.multiply(shares, limit(name)))
 
 
+@pytest.mark.sample(3)
+@pytest.mark.parametrize("name", CASES)
+def test_fit_to_print(name: str) -> None:
+    pressed = contact(f"{name} in units")
+    for figure in plots.press_figures(pressed).values():
+        fits(figure)
+        for axes in figure.axes[:2] if pressed.loads.any() else ():
+            assert axes.get_xlabel()
+            assert axes.get_ylabel()
+
+
 @pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("name", "shares"),
     [("paper", [0.9, -0.5, 0.6, -0.2, 0.4, 0.1, 0.8, 0.95]), ("paper", [-0.5, 0.1, 0.2, 1.0]),
      ("one", [0.5]), ("rough", [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7])],
 )  # fmt: skip
-def test_fit_to_print(name: str, shares: list[float]) -> None:
+def test_fit_to_print_when_sheared(name: str, shares: list[float]) -> None:
     name = f"{name} in units"
     ends = limit(name) * np.array([np.abs(shares), np.minimum(shares, -np.abs(shares) / 9)])
     fits(*plots.shear_figures(states(name, shares)).values())
@@ -72,17 +96,14 @@ def test_discs_have_the_radii_of_the_state() -> None:
     assert_allclose(lines["sliding"].get_facecolor(), [to_rgba(SLIDING)])
 
 
-def doubted(state: cr.ShearState, scope: Any, count: int) -> cr.ShearState:
-    """The state with doubt cast on the last of its touching asperities."""
-    status = state.status.copy()
-    status[np.flatnonzero(state.contact.loads)[-count:]] = "undecided"
-    certificate = dataclasses.replace(state.certificate, scope=scope, status=status)
-    return dataclasses.replace(state, certificate=certificate)
-
-
 @pytest.mark.parametrize(("scope", "count"), [("global", 4), ("none", 37)])
-def test_doubt_is_marked(scope: str, count: int) -> None:
-    state = doubted(states("paper", [0.5])[0], scope, count)
+def test_doubt_is_marked(scope: Any, count: int) -> None:
+    """Of the last of the asperities that touch."""
+    (sure,) = states("paper", [0.5])
+    status = sure.status.copy()
+    status[np.flatnonzero(sure.contact.loads)[-count:]] = "undecided"
+    certificate = dataclasses.replace(sure.certificate, scope=scope, status=status)
+    state = dataclasses.replace(sure, certificate=certificate)
     (axes,) = plots.shear_figures([state])["stick_slip"].axes
     (marks,) = [line for line in axes.lines if line.get_marker() == "x"]
     assert len(np.asarray(marks.get_xdata())) == discs(axes, "undecided") == count
@@ -147,3 +168,35 @@ def test_what_a_closed_path_settles_to() -> None:
     assert_allclose(dot, expected, rtol=1e-12, atol=1e-9)
     for status in LOOKS:
         assert discs(place, status) == int((found.status == status).sum())
+
+
+def test_the_colours_and_the_profile_show_the_pressure() -> None:
+    pressed = contact("rough")
+    chart, profile, bar = plots.press_figures(pressed)["pressure"].axes
+    E, P = 1.0, pressed.load
+    p0 = (6 * P * E**2 / np.pi**3) ** (1 / 3)  # R = 1
+    assert_allclose(bar.get_ylim(), (0, fields.peak_pressures(pressed).max() / p0), rtol=1e-12)
+    x, y = profile.collections[0].get_paths()[0].vertices.T  # type: ignore[union-attr]
+    a_H = (3 * P / 4) ** (1 / 3)
+    row = np.column_stack((x * a_H, np.zeros_like(x)))
+    shown = y > 1e-3
+    assert shown.sum() > 400
+    assert_allclose(y[shown], fields.pressure(pressed, row)[shown] / p0, rtol=1e-3)
+    (smooth,) = profile.lines
+    assert_allclose(np.hypot(*smooth.get_data()), 1, rtol=1e-12)
+    assert chart.get_xlim() == profile.get_xlim()
+
+
+def test_files_keep_their_text_and_pixels(tmp_path: Path) -> None:
+    figure = Figure(figsize=(1, 1))
+    figure.subplots().set_xlabel("load [mN]")
+    for form in ("svg", "pdf", "png"):
+        plots.save(figure, tmp_path / f"a.{form}", form, dpi=600)
+    text = (tmp_path / "a.svg").read_text(encoding="utf-8")
+    assert re.search(r"<text[^>]*>load \[mN\]</text>", text)
+    assert (tmp_path / "a.pdf").read_bytes().startswith(b"%PDF")
+    head = (tmp_path / "a.png").read_bytes()[16:24]
+    assert (int.from_bytes(head[:4]), int.from_bytes(head[4:])) == (600, 600)
+    before = text
+    plots.save(figure, tmp_path / "a.svg", "svg")
+    assert (tmp_path / "a.svg").read_text(encoding="utf-8") == before  # no date inside
