@@ -45,9 +45,8 @@ FEW = 128
 #: centre. There the displacements by a point force are 5 % too small, at the rim of the disc 15 %.
 BESIDE = 1.5
 
-#: A contact of at most this many asperities that can touch keeps what friction needs of its press;
-#: if the operator is a matrix, of at most `ALL_SHARP`.
-MOST_KEPT = 2**19
+#: A contact of at most this many asperities that can touch keeps what friction needs of its press.
+MOST_KEPT = {"dense": ALL_SHARP, "lattice": 2**19, "scattered": 2**16}
 
 if TYPE_CHECKING:
     from convexrough.gradients.change import ContactChange, Direction
@@ -364,8 +363,7 @@ def _contact(
             assert state is not None
             level = proved(problem, state)
             certificate = certificate_of(level, loads, state)
-            most = ALL_SHARP if problem.influence.stored else MOST_KEPT
-            top = level if len(problem) <= most else None
+            top = level if len(problem) <= MOST_KEPT[problem.influence.name] else None
         else:
             certificate = certify_on(problem, loads)
     said = isinstance(solver, solvers.Newton) or solver.name.endswith("Newton step")

@@ -130,9 +130,10 @@ def _iterated(
     if balanced:
         left -= float(slopes @ left) / float(slopes.sum())  # beta
         missing = -float(slopes @ step)
-    if not left.any():
+    size = float(np.linalg.norm(defect))
+    if size == 0.0 or not left.any():
         return step
-    share = float(np.linalg.norm(left)) / float(np.linalg.norm(defect))
+    share = float(np.linalg.norm(left)) / size
     rest = _iterate(influence, smooth, None, root, left, balanced, tolerance / share, missing)
     return None if rest is None else step + rest
 

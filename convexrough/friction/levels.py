@@ -25,7 +25,7 @@ from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair
 from convexrough.arrays import Array, Indices, among_zeros, frozen
 from convexrough.contact import Contact, levels_of
 from convexrough.errors import InputError
-from convexrough.friction.order import INVERTED, Order, order_between
+from convexrough.friction.order import MOST, Order, order_between
 from convexrough.influence.coupling import Coupling
 from convexrough.normal.level import Level, Rows, rows_of
 from convexrough.roundoff import AT_THE_END, ROUNDOFF, SAFETY
@@ -111,7 +111,7 @@ class FrictionLevels:
         self._named[load] = level
         return load
 
-    def order(self, loads: Iterable[Fraction], most: int = INVERTED) -> Order:
+    def order(self, loads: Iterable[Fraction], most: int = MOST) -> Order:
         """What is proved about order (`friction.order`) between the least of these loads and P."""
         asked = frozenset({*loads, self.load})
         if self._ordered is not None and min(asked) >= self._ordered:
@@ -186,15 +186,16 @@ def height_at(load: Fraction, force: float | Fraction, scene: Scene) -> Fraction
     return load if height > 0 else -load
 
 
-def prove_order(contact: Contact, *, most: int = 5_000) -> Order:
+def prove_order(contact: Contact, *, most: int = 1_000_000) -> Order:
     """What is proved about order at the loads between 0 and the load of `contact`.
 
     docs/theory/states.md, "Order", defines order and the results "proved", "proved for one step"
-    and "fails". Later results for this contact reuse the proof. On lattices, and where contacts are
-    far apart, the proof takes no time at any size, and all functions make it. Elsewhere it takes
-    the inverse of a matrix, and other functions make it only if at most 2,000 asperities touch.
+    and "fails". Later results for this contact reuse the proof. If contacts are far apart, or on a
+    lattice and not too crowded (theorems 1 and 2 of that page), the proof takes no time at any
+    size. Otherwise other functions try a proof only if at most 20,000 asperities touch, because for
+    more asperities it takes seconds.
 
-    most : largest number of touching asperities for which a matrix is inverted
+    most : largest number of touching asperities for which a proof that takes time is tried
 
     Raises InputError if the scene has no friction.
 

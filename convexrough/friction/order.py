@@ -2,7 +2,8 @@
 
 docs/theory/states.md, "The proof of order", defines the symbols and proves three theorems. The
 first two need distances only (`friction.spacing`); this file has theorem 3, the corollary and
-a bisection. C~ is a diagonal matrix. The weights of theorem 3 come from an inverse.
+a bisection. C~ is a diagonal matrix. For few asperities the weights of theorem 3 come from an
+inverse; for more, from `friction.sweeping`.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from convexrough.arrays import Array, Indices
 from convexrough.convex.newton_step import correct
 from convexrough.errors import SolverError
 from convexrough.friction.spacing import order_holds
+from convexrough.friction.sweeping import swept_rates
 from convexrough.influence.coupling import Influence, inverse_distances
 from convexrough.normal.boxes import Box
 from convexrough.normal.level import Level, Rows, rows_of
@@ -37,26 +39,26 @@ Order = Literal["proved", "proved for one step", "fails"]
 #: residual SOLVED.
 RATE_ROUNDING, SOLVED = 1e-9, 1e-10
 
-#: Largest number of touching asperities for which weights are computed, unless asked for more, and
-#: largest number for which they are computed at intermediate levels, too.
-INVERTED, BISECTED = 2000, 800
+#: Largest number of touching asperities for which an inverse is computed, and for which theorem 3
+#: is tried at all. `cr.prove_order` has a limit of its own.
+INVERTED, MOST = 600, 20_000
 
-#: Largest number of intermediate levels of the bisection, with weights and without; largest number
-#: of asperities whose rates are bounded, unless more may touch.
-BETWEEN, FEW_BETWEEN, MOST_BOUNDED = 7, 1, 4000
+#: Largest number of intermediate levels of the bisection, with an inverse and without one; largest
+#: number of asperities of which an inverse bounds rates.
+BETWEEN, FEW_BETWEEN, MOST_BOUNDED = 7, 1, 4 * INVERTED
 
 #: Number of entries of matrices with which rates are computed together: they fit in a cache.
 TOGETHER = 2**16
 
 
 def order_between(
-    at: Callable[[Fraction], Level], loads: Iterable[Fraction], most: int = INVERTED
+    at: Callable[[Fraction], Level], loads: Iterable[Fraction], most: int = MOST
 ) -> Order:
     """What is proved about order, by bisection, between the ends of `loads`, whose levels are in
     use.
 
     at   : function that returns the level at a load
-    most : largest number of touching asperities for which weights are computed
+    most : largest number of touching asperities for which theorem 3 is tried
     """
     used = sorted(set(loads), reverse=True)
     top = at(used[0])
@@ -66,7 +68,7 @@ def order_between(
     if _falls(map(at, used), map(at, used), rising):  # levels are computed as they are needed
         return "fails"
     unproved = [(used[0], used[-1])]
-    left = BETWEEN if rising.sum() <= BISECTED else FEW_BETWEEN
+    left = BETWEEN if rising.sum() <= INVERTED else FEW_BETWEEN
     while len(unproved) <= left:  # each interval needs at least one level
         left -= 1
         high, low = unproved.pop(0)
@@ -78,16 +80,14 @@ def order_between(
         if _falls([at(high), level, at(low)], [level], rising):
             return "fails"
         for a, b in ((high, middle), (middle, low)):
-            if rising.sum() > BISECTED or not proved_between(at(a), at(b), rising):
+            if rising.sum() > INVERTED or not proved_between(at(a), at(b), rising):
                 unproved.append((a, b))
         if not unproved:
             return "proved"
     return "proved for one step"
 
 
-def proved_between(
-    upper: Level, lower: Level, rising: NDArray[np.bool_], most: int = INVERTED
-) -> bool:
+def proved_between(upper: Level, lower: Level, rising: NDArray[np.bool_], most: int = MOST) -> bool:
     """True if the upper level proves order down to the lower level.
 
     rising : (n,) true for asperities that may touch at the highest load of the path
@@ -107,9 +107,11 @@ def proved_between(
     if len(left) == 0:
         return True
     both = np.concatenate((support, np.setdiff1d(left, support)))
-    too_many = len(support) > most or len(both) > max(2 * most, MOST_BOUNDED)
-    if too_many or not span.regular.all():
+    if not span.regular.all() or len(support) > max(INVERTED, most):
         return False
+    if len(support) > INVERTED or len(both) > MOST_BOUNDED:
+        swept = swept_rates(influence, c, rates, np.where(rising, 0.0, span.spare[0]))
+        return not span.unsettled(swept[None], rising).any()
     entries = influence.scale * inverse_distances(influence.points[both], influence.points[support])
     error = np.full((1, 1), influence.entry_error)
     return bool(span.settled(rates[None], rising, both[None], entries[None], error)[0])
