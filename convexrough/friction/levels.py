@@ -192,10 +192,10 @@ def prove_order(contact: Contact, *, most: int = 1_000_000) -> Order:
     docs/theory/states.md, "Order", defines order and the results "proved", "proved for one step"
     and "fails". Later results for this contact reuse the proof. If contacts are far apart, or on a
     lattice and not too crowded (theorems 1 and 2 of that page), the proof takes no time at any
-    size. Otherwise other functions try a proof only if at most 20,000 asperities touch, because for
-    more asperities it takes seconds.
+    size. Otherwise it needs weights for the touching asperities; on a lattice only for those near
+    large contacts. Other functions try this for at most 20,000, as for more it takes seconds.
 
-    most : largest number of touching asperities for which a proof that takes time is tried
+    most : largest number of asperities for which weights are computed
 
     Raises InputError if the scene has no friction.
 

@@ -21,9 +21,10 @@ from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, Indices
 from convexrough.convex.newton_step import correct
 from convexrough.errors import SolverError
-from convexrough.friction.spacing import order_holds
+from convexrough.friction.spacing import order_holds, settled_by_rings
 from convexrough.friction.sweeping import swept_rates
 from convexrough.influence.coupling import Influence, inverse_distances
+from convexrough.influence.lattice import LatticeInfluence
 from convexrough.normal.boxes import Box
 from convexrough.normal.level import Level, Rows, rows_of
 from convexrough.normal.stack import Stack
@@ -39,8 +40,8 @@ Order = Literal["proved", "proved for one step", "fails"]
 #: residual SOLVED.
 RATE_ROUNDING, SOLVED = 1e-9, 1e-10
 
-#: Largest number of touching asperities for which an inverse is computed, and for which theorem 3
-#: is tried at all. `cr.prove_order` has a limit of its own.
+#: Largest number of touching asperities for which an inverse is computed, and largest number of
+#: asperities for which weights are computed at all. `cr.prove_order` has a limit of its own.
 INVERTED, MOST = 600, 20_000
 
 #: Largest number of intermediate levels of the bisection, with an inverse and without one; largest
@@ -58,7 +59,7 @@ def order_between(
     use.
 
     at   : function that returns the level at a load
-    most : largest number of touching asperities for which theorem 3 is tried
+    most : largest number of asperities for which weights are computed
     """
     used = sorted(set(loads), reverse=True)
     top = at(used[0])
@@ -107,7 +108,15 @@ def proved_between(upper: Level, lower: Level, rising: NDArray[np.bool_], most: 
     if len(left) == 0:
         return True
     both = np.concatenate((support, np.setdiff1d(left, support)))
-    if not span.regular.all() or len(support) > max(INVERTED, most):
+    if not span.regular.all():
+        return False
+    if isinstance(influence, LatticeInfluence):  # few need weights; then no rate may be negative
+        rings = settled_by_rings(problem.scene, influence, influence.scale * c)
+        known = np.where(rings, np.maximum(rates, SAFETY), rates)
+        few = np.count_nonzero(~(known > 0)) <= most
+        if few and (swept_rates(influence, c, known, np.zeros(len(c))) > 0).all():
+            return True
+    if len(support) > max(INVERTED, most):
         return False
     if len(support) > INVERTED or len(both) > MOST_BOUNDED:
         swept = swept_rates(influence, c, rates, np.where(rising, 0.0, span.spare[0]))

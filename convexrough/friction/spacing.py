@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from convexrough.arrays import Array
 from convexrough.influence.coupling import Influence
@@ -51,22 +52,37 @@ def largest_shell(scene: Scene) -> float:
     return ring.shell * lattice.spacing if sure else 0.0
 
 
+def settled_by_rings(scene: Scene, influence: LatticeInfluence, shells: Array) -> NDArray[np.bool_]:
+    """(n,) True where asperities lie at all sites z around an asperity, and none of them has a
+    shell above the number of theorem 2: then its rate is positive if no rate is negative.
+    """
+    assert scene.lattice is not None
+    ring, limit = scene.lattice.cached(_Ring.of), largest_shell(scene)
+    (rows, columns), (i, j) = influence.box.shape, influence.cells
+    field = np.full((rows + 2, columns + 2), np.inf)
+    field[i + 1, j + 1] = shells
+    around = [field[i + 1 + a, j + 1 + b] <= limit for a, b in (*ring.steps, *-ring.steps)]
+    return np.asarray(np.logical_and.reduce(around) & (limit > 0))
+
+
 class _Ring(NamedTuple):
     """The charges of theorem 2; lengths are divided by the spacing of the lattice."""
 
     longest: float  # largest |z_k|
     shell: float  # largest radius of the shells
     gain: float  # at most |x|^3 times (left minus right side of (5)), for x other than the z
+    steps: NDArray[np.intp]  # (3, 2) half of the vectors z, in units of b1 and b2
 
     @classmethod
     def of(cls, lattice: Lattice) -> _Ring:
-        b1, b2 = basis = lattice.basis / lattice.spacing
+        basis = lattice.basis / lattice.spacing
         (g11, g12), (_, g22) = basis @ basis.T
-        half = np.array([b1, b2, b1 - b2 if g12 > 0 else b1 + b2]) @ [1.0, 1.0j]
+        half_steps = np.array([[1, 0], [0, 1], [1, -1 if g12 > 0 else 1]])
+        half = half_steps @ basis @ [1.0, 1.0j]
         shares = np.array([g22 - abs(g12), g11 - abs(g12), abs(g12)])
         z, w = np.concatenate((half, -half)), np.tile(shares / shares.sum() / 2, 2)
         if (longest := float(np.abs(z).max())) > LONGEST:
-            return cls(longest, 0.0, 0.0)
+            return cls(longest, 0.0, 0.0, half_steps)
         m, n = np.ceil(4.0 * longest / np.sqrt([g11, g22])).astype(int)
         steps = np.mgrid[-m : m + 1, -n : n + 1].reshape(2, -1).T  # all sites of the disc, and more
         x = steps @ basis @ [1.0, 1.0j]
@@ -78,4 +94,5 @@ class _Ring(NamedTuple):
         shell = charge[ring & (needed > 0)] / needed[ring & (needed > 0)]
         gains = (np.abs(x) * potentials - 1.0) * np.abs(x) ** 2
         far = (w * np.abs(z) ** 2).sum() / 8 - 0.75 * abs((w * z**2).sum())
-        return cls(longest, shell.min(initial=HALF), min(far, gains[~ring].min()))
+        found = shell.min(initial=HALF), min(far, gains[~ring].min())
+        return cls(longest, *found, half_steps)

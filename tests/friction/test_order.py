@@ -7,16 +7,18 @@ from typing import Any
 import numpy as np
 import pytest
 from path_scenes import around, on_flat, ring, shaded
-from scenes import on_sphere
+from scenes import MATERIAL, on_sphere
 
 import convexrough as cr
 from convexrough.arrays import Array
 from convexrough.bench.scenes import scene as bench_scene
 from convexrough.friction import order, sweeping
 from convexrough.friction.levels import FrictionLevels
-from convexrough.friction.spacing import largest_shell, order_holds
+from convexrough.friction.spacing import largest_shell, order_holds, settled_by_rings
 from convexrough.friction.sweeping import swept_rates
+from convexrough.influence import couple
 from convexrough.influence.dense import DenseInfluence
+from convexrough.influence.lattice import LatticeInfluence
 
 NOTHING = Fraction(0)
 
@@ -171,6 +173,32 @@ def test_theorem_2_gives_nothing_away(name: str) -> None:
     ring = (apart > 0.5) & (apart < 1.1)
     assert rates(points, np.where(ring, limit, 0.0))[apart == 0] > 0
     assert rates(points, np.where(ring, 1.004 * limit, 0.0))[apart == 0] < 0
+
+
+def test_large_shells_among_rings() -> None:
+    """Some shells exceed the number of the lattice. Where rings and weights prove all, rates are
+    positive; near the largest shells they prove nothing.
+    """
+    random, proved = np.random.default_rng(3), 0
+    scene = cr.Scene(
+        1.0, cr.Asperities.hexagonal(spacing=1.0, tip_radius=1.0, within=11.0), MATERIAL
+    )
+    points, limit = scene.asperities.positions, largest_shell(scene)
+    A = couple(scene, np.arange(len(scene)), 1.0, "lattice")
+    assert isinstance(A, LatticeInfluence)
+    for _ in range(30):
+        shells = limit * random.uniform(0.2, 0.9, len(points)) * (random.random(len(points)) < 0.9)
+        large = random.integers(0, len(points), 5)
+        shells[large] = limit * random.uniform(1.0, 1.4)
+        rings = settled_by_rings(scene, A, shells)
+        assert not rings[np.hypot(*points.T) > 10.5].any()
+        known = np.where(rings, 1e-12, 1.0 - A.apply(shells))
+        bounds = swept_rates(A, shells, known, np.zeros(len(points)))
+        if (bounds > 0).all():
+            proved += 1
+            for share in (1.0, *random.random((3, len(points))).round()):
+                assert (rates(points, shells * share) > 0).all()
+    assert proved > 10
 
 
 def test_shells_without_a_bound_prove_nothing() -> None:
