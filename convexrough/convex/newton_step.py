@@ -36,7 +36,7 @@ SINGLE_LIMIT, DOUBLE_LIMIT = 2e-6, 1e-13
 #: below ENERGY times SINGLE_LIMIT or DOUBLE_LIMIT times its first value.
 ENERGY = 1e-2
 
-#: A step is made in two parts if TWICE times its tolerance is below the limit of single precision.
+#: A step is made in two parts if TWICE times its tolerance is at most SINGLE_LIMIT.
 TWICE = 30.0
 
 MOST_ITERATIONS = 500
@@ -75,7 +75,7 @@ def correct(
         if direct:
             step = _factorise(influence, extra, touching, root, defect, balanced)
         else:
-            step = _iterated(influence, extra, root, defect, balanced, tolerance)
+            step = _in_two_parts(influence, extra, root, defect, balanced, tolerance)
         if step is not None:
             return step
     raise SolverError("the matrix of a step is not positive definite", solver="newton")
@@ -112,7 +112,7 @@ def softness_of(slopes: Array) -> Array:
     return np.asarray(1.0 / np.maximum(slopes, LEAST_SLOPE))
 
 
-def _iterated(
+def _in_two_parts(
     influence: Influence,
     shells: Array | None,
     root: Array,
@@ -120,7 +120,7 @@ def _iterated(
     balanced: bool,
     tolerance: float,
 ) -> Array | None:
-    """The step by `_iterate`; where single precision is not enough, in two parts."""
+    """The step by `_iterate`; in two parts only where single precision is not enough."""
     smooth = influence.smoother(root)
     step = _iterate(influence, smooth, shells, root, defect, balanced, tolerance)
     if step is None or shells is not None or influence.stored or TWICE * tolerance > SINGLE_LIMIT:

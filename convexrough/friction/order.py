@@ -112,7 +112,7 @@ def proved_between(upper: Level, lower: Level, rising: NDArray[np.bool_], most: 
         return False
     if isinstance(influence, LatticeInfluence):  # few need weights; then no rate may be negative
         rings = settled_by_rings(problem.scene, influence, influence.scale * c)
-        known = np.where(rings, np.maximum(rates, SAFETY), rates)
+        known = np.where(rings, np.maximum(rates, SAFETY), rates)  # any positive number will do
         few = np.count_nonzero(~(known > 0)) <= most
         if few and (swept_rates(influence, c, known, np.zeros(len(c))) > 0).all():
             return True

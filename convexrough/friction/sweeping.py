@@ -5,12 +5,12 @@ charges on shells, onto which a unit charge at asperity i is swept. For weights 
 1 - q_i is a lower bound on the rate y_i for all C with 0 <= C <= C~, if it is positive for all i on
 the support. The shells have the radii R_k = c~_k / (pi E*).
 
-The weights are those for which some moments vanish and which, together with a charge
--1 at i, have the least electrostatic energy. The moments are sums of w_k times functions of z_k,
-the vector from i to k as a complex number, divided by the direction from the middle of the support
-to i. Where such weights fail, a linear program finds those with the least q_i, for few asperities.
-For an asperity i outside the contact one neighbour alone suffices if the whole support is nearer to
-this neighbour than to i, and the neighbour's shell does not reach i.
+The weights are those for which some moments vanish and which, together with a charge -1 at i, have
+the least electrostatic energy. The moments are sums of w_k times functions of z_k, the vector from
+i to k as a complex number, divided by the direction from the middle of the support to i. Where such
+weights fail, a linear program finds those with the least q_i, for few asperities. For an asperity i
+outside the contact one neighbour alone suffices if the whole support is nearer to this neighbour
+than to i, and the neighbour's shell does not reach i.
 """
 
 from __future__ import annotations
