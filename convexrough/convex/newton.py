@@ -49,7 +49,9 @@ class Iterate(NamedTuple):
     rounding: float  # bound on the rounding error of a change of the energy
     residual: float  # the largest |F|
     scale: float  # the unit of residuals
-    noise: float  # the 2-norm of F below which, because of rounding, further steps do not help
+    #: the 2-norm of F below which, because of rounding, further steps do not help; 0 if F is far
+    #: larger
+    noise: float
     at: Any  # further results of the law at this point
 
 

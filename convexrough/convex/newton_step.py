@@ -27,7 +27,7 @@ from convexrough.influence.coupling import Influence, Smoother
 
 #: Largest number of touching asperities for which Cholesky's factorisation is cheapest, with and
 #: without a stored matrix. Heuristics, from timings.
-FACTORISED, FACTORISED_UNSTORED = 1500, 100
+FACTORISED, FACTORISED_UNSTORED = 4000, 100
 
 #: Least relative residual to which conjugate gradients run, in single and in double precision.
 SINGLE_LIMIT, DOUBLE_LIMIT = 2e-6, 1e-13

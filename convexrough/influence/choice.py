@@ -18,7 +18,7 @@ KINDS: tuple[Kind, ...] = get_args(Kind)
 #: A matrix is fastest for at most FEW_ASPERITIES asperities on a lattice, and for at most
 #: FEW_SCATTERED that form no lattice. Timed on two cores; the numbers affect speed only.
 FEW_ASPERITIES = 512
-FEW_SCATTERED = 3000
+FEW_SCATTERED = 2000
 
 
 def couple(scene: Scene, which: Indices, scale: float, kind: Kind | None = None) -> Influence:

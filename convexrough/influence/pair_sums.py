@@ -142,7 +142,7 @@ class NearPairs:
 
     @classmethod
     def assemble(cls, mesh: Mesh) -> NearPairs:
-        from scipy.sparse import csr_array
+        from scipy.sparse import coo_array
         from scipy.spatial import cKDTree
 
         points, splitting = mesh.points, mesh.splitting
@@ -150,38 +150,49 @@ class NearPairs:
         some = points[:: max(1, n // SAMPLE)]
         near = np.sum(tree.query_ball_point(some, splitting.cut, return_length=True))
         checks.fits_in_memory("asperities that could touch", n, BYTES * near / max(len(some), 1))
-        i, j = tree.query_pairs(splitting.cut, output_type="ndarray").T.astype(np.int32)
-        values, nearest = np.empty(len(i), dtype=mesh.dtype), [splitting.cut]
+        pairs = tree.query_pairs(splitting.cut, output_type="ndarray")
+        places = tuple(np.ascontiguousarray(each, dtype=np.int32) for each in pairs.T)
+        ones = coo_array((np.ones(len(pairs), dtype=mesh.dtype), places), shape=(n, n))
+        ones.has_canonical_format = True  # no pair occurs twice, so rows need not be sorted
+        del pairs, places  # saves memory
+        upper, nearest = ones.tocsr(), [splitting.cut]
+        terms = int(both_ways(upper, np.ones(n, dtype=mesh.dtype)).max(initial=0))
 
-        def compute(some: slice) -> None:
-            apart = points[i[some]] - points[j[some]]
+        def compute(rows: slice) -> None:
+            some, here = entries(upper, rows)
+            there = upper.indices[some]
+            apart = points.take(here, axis=0)
+            apart -= points.take(there, axis=0)
             if mesh.tails is not None:
-                apart += mesh.tails[i[some]] - mesh.tails[j[some]]
-            apart *= apart
-            squares = apart[:, 0] + apart[:, 1]
-            values[some] = splitting.kernel.local(squares)
+                apart += mesh.tails.take(here, axis=0) - mesh.tails.take(there, axis=0)
+            squares = np.einsum("ij,ij->i", apart, apart)
+            upper.data[some] = splitting.kernel.local(squares)
             nearest.append(float(np.sqrt(squares[squares > 0].min(initial=np.inf))))
 
-        threads.each(compute, threads.chunks(len(i), CHUNK), threads.worthwhile(len(i)))
-        terms = np.bincount(i, minlength=n) + np.bincount(j, minlength=n)
-        upper = csr_array((values, (i, j)), shape=(n, n))
-        most = int(terms.max(initial=0))
-        return cls(upper, -splitting.kernel.centre, most, min(nearest))
+        threads.each(compute, row_parts(upper, CHUNK), threads.worthwhile(upper.nnz))
+        return cls(upper, -splitting.kernel.centre, terms, min(nearest))
 
     def apply(self, loads: NDArray[Any]) -> NDArray[Any]:
         result = both_ways(self.upper, loads)
         result += loads.dtype.type(self.own) * loads
         return result
 
-    def in_parts(self, size: int) -> Iterator[tuple[slice, Indices]]:
-        """Slices of about `size` entries of `upper` in whole rows, with the row of each entry."""
-        edges, start = self.upper.indptr, 0
-        while start < self.upper.shape[0]:
-            end = int(np.searchsorted(edges, int(edges[start]) + size, "right")) - 1
-            stop = max(start + 1, end)
-            here = np.repeat(np.arange(start, stop), np.diff(edges[start : stop + 1]))
-            yield slice(int(edges[start]), int(edges[stop])), here
-            start = stop
+
+def row_parts(matrix: Any, size: int) -> Iterator[slice]:
+    """Slices of rows of a sparse matrix (CSR) with about `size` entries each."""
+    edges, start = matrix.indptr, 0
+    while start < len(edges) - 1:
+        end = int(np.searchsorted(edges, int(edges[start]) + size, "right")) - 1
+        stop = max(start + 1, end)
+        yield slice(start, stop)
+        start = stop
+
+
+def entries(matrix: Any, rows: slice) -> tuple[slice, Indices]:
+    """The slice of the entries of a sparse matrix (CSR) in these rows, and the row of each."""
+    edges = matrix.indptr[rows.start : rows.stop + 1]
+    here = np.repeat(np.arange(rows.start, rows.stop), np.diff(edges))
+    return slice(int(edges[0]), int(edges[-1])), here
 
 
 def both_ways(upper: Any, loads: NDArray[Any]) -> NDArray[Any]:
@@ -280,7 +291,8 @@ class Product:
         """
         ordered, points, kernel = values[self.mesh.places], self.mesh.points, self._softer
         total, n = np.zeros_like(points), len(points)
-        for some, here in self.near.in_parts(PAIRS):
+        for rows in row_parts(self.near.upper, PAIRS):
+            some, here = entries(self.near.upper, rows)
             there = self.near.upper.indices[some]
             apart = points[here] - points[there]
             weights = kernel.local((apart**2).sum(axis=1))

@@ -14,7 +14,7 @@ import numpy as np
 
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair
-from convexrough.arrays import Array, Indices
+from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.influence import coupling
 from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.pair_sums import Product
@@ -32,6 +32,10 @@ SINGLE_TOLERANCE, FALLOFF_TOLERANCE = 1e-5, 5e-3
 
 #: Up to this number of asperities, `sums` uses a matrix, which is faster and gives 27 digits.
 FEW = 1500
+
+#: A restricted operator uses the mesh of the whole operator for products in double precision if it
+#: has at least this part of the asperities. Affects speed only.
+SHARED = 0.25
 
 #: Largest number of pairs (asperity, other point) that `onto` computes one by one. Affects speed
 #: only.
@@ -52,11 +56,17 @@ class ScatteredInfluence(coupling.Influence):
     scale: float
     point_error: float = 0.0
     tails: Array | None = None
+    #: The operator from which this one is restricted, and its asperities there. Its mesh serves for
+    #: products in double precision; None if this would not save time.
+    whole: tuple[ScatteredInfluence, Indices] | None = None
 
     name: ClassVar[coupling.Kind] = "scattered"
 
     def apply(self, loads: Array) -> Array:
         dtype = np.float32 if loads.dtype == np.float32 else np.float64
+        if self.whole and dtype == np.float64:
+            A, which = self.whole
+            return A.apply(among_zeros(loads, which, len(A)))[which]
         product = self._product(1, dtype)
         if product is None:
             return self._dense.apply(loads.astype(np.float64, copy=False)).astype(dtype, copy=False)
@@ -65,6 +75,9 @@ class ScatteredInfluence(coupling.Influence):
         return found
 
     def rounding(self, loads: Array) -> coupling.Rounding:
+        if self.whole:
+            A, which = self.whole
+            return A.rounding(among_zeros(loads, which, len(A)))
         if self._double is None:
             return self._dense.rounding(loads)
         rounding = self._double.rounding(loads)
@@ -82,7 +95,8 @@ class ScatteredInfluence(coupling.Influence):
 
     def restricted(self, which: Indices) -> ScatteredInfluence:
         tails = None if self.tails is None else self.tails[which]
-        return replace(self, points=self.points[which], tails=tails)
+        whole = (self, which) if len(which) >= SHARED * len(self) else None
+        return replace(self, points=self.points[which], tails=tails, whole=whole)
 
     def onto(self, points: Array) -> coupling.Coupling:
         if len(points) * len(self) <= FEW_PAIRS:

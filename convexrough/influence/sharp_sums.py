@@ -23,7 +23,7 @@ from convexrough import threads
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import CHUNK, Pair, rounded, two_product, two_sum
 from convexrough.arrays import Array, Indices
-from convexrough.influence.pair_sums import Product, both_ways, within
+from convexrough.influence.pair_sums import Product, both_ways, entries, row_parts, within
 from convexrough.influence.sliced import SLICES, Distances, Sliced
 from convexrough.influence.sliced_matrix import squared_distances
 from convexrough.influence.softened import TWOFOLD_WEIGHT, Softened, exact_series, lebesgue
@@ -118,16 +118,21 @@ class SharpPairs:
             points = Pair(mesh.points, mesh.tails)
         first, second = np.empty_like(upper.data), np.empty_like(upper.data)
 
-        def cut(part: tuple[slice, Indices]) -> None:
-            some, here = part
-            squares = squared_distances(points.at(here), points.at(upper.indices[some]))
+        def cut(rows: slice) -> None:
+            some, here = entries(upper, rows)
+            # `take` is several times faster than an index.
+            one, other = (
+                Pair(*(part.take(end, axis=0) for part in points))
+                for end in (here, upper.indices[some])
+            )
+            squares = squared_distances(one, other)
             inverse, smooth = squares.inverse_root(), soft(squares)
             high, low = two_sum(inverse.high, -smooth.high)
             low += inverse.low - smooth.low
             first[some] = rounded(high + low, np.asarray(self.unit))
             second[some] = (high - first[some]) + low
 
-        threads.each(cut, product.near.in_parts(CHUNK), threads.worthwhile(len(first)))
+        threads.each(cut, row_parts(upper, CHUNK), threads.worthwhile(len(first)))
         self.first, self.second = (
             csr_array((part, upper.indices, upper.indptr), shape=upper.shape)
             for part in (first, second)

@@ -38,6 +38,10 @@ ALL_ITERATED = 1000
 #: Largest residual of a solution, divided by |D0| + max |d_i|, unless `tolerance` is larger.
 ACCURATE = 1e-12
 
+#: Rounding errors are estimated where the residual is at most this part of |D0| + max |d_i|; larger
+#: residuals are far above them. Affects speed only.
+NOISY = 1e-6
+
 #: Asperities are near the contact if their gap is at most this part of the largest D_i. Affects
 #: speed only.
 MARGIN = 0.03
@@ -65,6 +69,9 @@ class Pressing:
             total = at.approach * problem.load
         energy = float(at.loads @ (at.gap - 0.4 * at.own - 0.5 * at.displacement)) + total
         residual, scale = float(np.abs(at.defect).max()), float(abs(at.approach)) + self.farthest
+        noise = 0.0
+        if residual <= NOISY * scale:
+            noise = problem.influence.rounding(at.loads).negligible(at.displacement)
         return newton.Iterate(
             unknown=at.unknown,
             forces=at.loads,
@@ -74,7 +81,7 @@ class Pressing:
             rounding=SAFETY * float(at.loads.sum()) * scale,
             residual=residual,
             scale=scale,
-            noise=problem.influence.rounding(at.loads).negligible(at.displacement),
+            noise=noise,
             at=at,
         )
 

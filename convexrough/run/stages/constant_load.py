@@ -26,8 +26,8 @@ from convexrough.scene.rings import one_of_each_ring
 MOST_LOOPS = 12
 
 #: Most and fewest points of a loop by default. Between these, the number of touching asperities
-#: times points is at most AFFORDABLE.
-MOST_POINTS, LEAST_POINTS, AFFORDABLE = 400, 32, 600_000
+#: times points is at most the first number of AFFORDABLE on a lattice, and the second elsewhere.
+MOST_POINTS, LEAST_POINTS, AFFORDABLE = 400, 32, (600_000, 150_000)
 
 Points = Annotated[int, expected("a whole number, at least 4", lambda value: value >= 4)]
 
@@ -173,7 +173,8 @@ class CycleResult(Result):
         """For each cycle, the loops of the whole contact and of some asperities."""
         stage, contact = self.stage, self.contact
         touching = max(1, int((contact.loads > 0).sum()))
-        affordable = int(np.clip(AFFORDABLE // touching, LEAST_POINTS, MOST_POINTS))
+        most = AFFORDABLE[contact.scene.lattice is None]
+        affordable = int(np.clip(most // touching, LEAST_POINTS, MOST_POINTS))
         if any(each.order == "fails" for each in self.found):  # a general step for each point
             affordable = LEAST_POINTS
         chosen = stage.loop_asperities
