@@ -193,7 +193,8 @@ def prove_order(contact: Contact, *, most: int = 1_000_000) -> Order:
     and "fails". Later results for this contact reuse the proof. If contacts are far apart, or on a
     lattice and not too crowded (theorems 1 and 2 of that page), the proof takes no time at any
     size. Otherwise it needs weights for the touching asperities; on a lattice only for those near
-    large contacts. Other functions try this for at most 20,000, as for more it takes seconds.
+    large contacts and at the rim. Other functions try this for at most 20,000, as for more it
+    takes seconds.
 
     most : largest number of asperities for which weights are computed
 

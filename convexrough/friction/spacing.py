@@ -70,7 +70,7 @@ class _Ring(NamedTuple):
 
     longest: float  # largest |z_k|
     shell: float  # largest radius of the shells
-    gain: float  # at most |x|^3 times (left minus right side of (5)), for x other than the z
+    gain: float  # at most |x|^3 times (left minus right side of (5)), except where w_x is positive
     steps: NDArray[np.intp]  # (3, 2) half of the vectors z, in units of b1 and b2
 
     @classmethod
