@@ -27,8 +27,8 @@ from convexrough.influence.splitting import Splitting
 #: the error of `sums`, about 1e-16.
 TOLERANCE = 5e-17
 
-#: The same target for loads in single precision, and for `falloff`.
-SINGLE_TOLERANCE, FALLOFF_TOLERANCE = 1e-5, 5e-3
+#: The same target for loads in single precision, and for `falloff` with each power.
+SINGLE_TOLERANCE, FALLOFF_TOLERANCE = 1e-5, {1: 1e-4, 2: 5e-3, 3: 5e-3}
 
 #: Up to this number of asperities, `sums` uses a matrix, which is faster and gives 27 digits.
 FEW = 1500
@@ -67,7 +67,8 @@ class ScatteredInfluence(coupling.Influence):
         if self.whole and dtype == np.float64:
             A, which = self.whole
             return A.apply(among_zeros(loads, which, len(A)))[which]
-        product = self._product(1, dtype)
+        single = SINGLE_TOLERANCE, np.float32
+        product = self._product(1, *single) if dtype == np.float32 else self._double
         if product is None:
             return self._dense.apply(loads.astype(np.float64, copy=False)).astype(dtype, copy=False)
         found = product.apply(loads.astype(dtype, copy=False))
@@ -87,7 +88,7 @@ class ScatteredInfluence(coupling.Influence):
         return coupling.Rounding(1.01 * (rounding.relative + points), each)
 
     def falloff(self, strengths: Array, power: int) -> Array:
-        product = self._product(power, np.float64)
+        product = self._product(power, FALLOFF_TOLERANCE[power], np.float64)
         if product is None:
             return self._dense.falloff(strengths, power)
         moved = coupling.entry_error(self._unknown, product.near.nearest)
@@ -129,7 +130,7 @@ class ScatteredInfluence(coupling.Influence):
 
     @property
     def _double(self) -> Product | None:
-        return self._product(1, np.float64)
+        return self._product(1, TOLERANCE, np.float64)
 
     @cached_property
     def _dense(self) -> DenseInfluence:
@@ -137,18 +138,16 @@ class ScatteredInfluence(coupling.Influence):
         return DenseInfluence.assemble(self.points, self.scale, self.point_error, self.tails)
 
     @cached_property
-    def _products(self) -> dict[tuple[int, Any], Product | None]:
+    def _products(self) -> dict[tuple[int, float], Product | None]:
         return {}
 
-    def _product(self, power: int, dtype: Any) -> Product | None:
+    def _product(self, power: int, tolerance: float, dtype: Any) -> Product | None:
         """The map from loads P_j to the sums over j of P_j / r_ij^power; None without a mesh."""
-        if (power, dtype) not in self._products:
-            accuracy = SINGLE_TOLERANCE if dtype == np.float32 else TOLERANCE
-            tolerance = accuracy if power == 1 else FALLOFF_TOLERANCE
+        if (power, tolerance) not in self._products:
             splitting = Splitting.choose(self.points, power, tolerance)
             found = splitting and Product.assemble(self.points, splitting, dtype, self.tails)
-            self._products[power, dtype] = found or None
-        return self._products[power, dtype]
+            self._products[power, tolerance] = found or None
+        return self._products[power, tolerance]
 
     @cached_property
     def _unknown(self) -> float:

@@ -23,6 +23,11 @@ RINGS, LEAST = 128, 150
 #: Of more asperities than this, only every k-th is used, with the largest k that leaves so many.
 SAMPLE = 50_000
 
+#: The method begins with the displacement by a smooth body times SUNK: a little less, because its
+#: steps are too long where indentations are nearly 0. It ends when a step is at most ENOUGH times
+#: the approach, and fails after STEPS steps. Heuristics.
+SUNK, ENOUGH, STEPS = 0.98, 1e-4, 20
+
 #: The evenly spread load of a ring includes each asperity's own load, spread over the asperity's
 #: share of the area. The displacement of the asperity by this part must be subtracted. It is
 #: OWN_SHARE times the displacement of the centre of a uniformly loaded disc of the same area.
@@ -34,7 +39,7 @@ OWN_SHARE = 1.10
 def mean_field_indentation(problem: NormalProblem) -> Array:
     """(n,) initial indentations in scaled units, negative where open.
 
-    If the rings lead to no finite solution, the result is that of `on_hertz_pressure`.
+    If the rings lead to no solution, the result is that of `on_hertz_pressure`.
     """
     try:
         start = _mean_field(problem)
@@ -73,11 +78,12 @@ def _mean_field(problem: NormalProblem) -> Array:
 
     offsets, coefficients = problem.offsets[some], problem.coefficients[some]
     approach = problem.approach_bound
-    w = np.zeros(count)
+    smooth = np.full(count, approach)
     if problem.scene.curved:
         touching = np.sqrt(smooth_reach(problem)), problem.scene.mean_radius
-        w = hertz.surface_displacement(middle, *touching) / problem.units.length
-    for _ in range(30):
+        smooth = hertz.surface_displacement(middle, *touching) / problem.units.length
+    w = SUNK * smooth
+    for _ in range(STEPS):
         indentation = approach + offsets - between(w, places[some])
         loads = hertz.load(indentation, coefficients)
         slopes = 1.5 * loads / np.where(loads > 0, indentation, 1.0)
@@ -90,9 +96,9 @@ def _mean_field(problem: NormalProblem) -> Array:
             right = np.append(right, problem.load - float(P.sum()))
         step = np.linalg.solve(system, right)
         w, approach = w + step[:count], approach + float(step[count:].sum())
-        if np.abs(step).max() <= 1e-6 * abs(approach):
-            break
-    return np.asarray(approach + problem.offsets - between(w, places))
+        if np.abs(step).max() <= ENOUGH * abs(approach):
+            return np.asarray(approach + problem.offsets - between(w, places))
+    return on_hertz_pressure(problem)  # contacts are too crowded
 
 
 def _disc(distance: Array, radius: Array) -> Array:

@@ -100,3 +100,16 @@ def test_those_left_out_at_first_are_found(control: str) -> None:
     found = cr.press(pressed, **given, influence="lattice")
     assert found.candidates > ALL_ITERATED
     assert_allclose(found.loads, known.loads, rtol=0, atol=1e-12 * known.loads.max())
+
+
+@pytest.mark.parametrize(
+    ("pressed", "approach"),
+    [
+        (scene(12), 4.147157190635452e-05),
+        (scene(12), 4.79933110367893e-05),
+        (replace(hexagonal(0.0025 / 9, 0.004 / 9, 0.012), sphere_radius=np.inf), 2e-4),
+    ],
+)
+def test_the_start_is_good(pressed: cr.Scene, approach: float) -> None:
+    """Two approaches at which rings that begin on a smooth sphere fail, and a flat."""
+    assert cr.press(pressed, approach=approach).iterations <= 5
