@@ -82,7 +82,7 @@ def cautions_of(contact: Contact, known: Mapping[str, Any] | None = None) -> Ite
     loaded = int(((contact.loads > 0) & (proof.status == "open")).sum())
     far = proof.load_error > INACCURATE * largest and "contact" in proof.status
     if largest and (loaded or far):  # `cautions` warns of loads that are all 0
-        off = f"{bound(100 * proof.load_error / largest, 2)} % of the largest load"
+        off = f"{bound(100 * proof.load_error / largest, 3)} % of the largest load"
         yield (
             f"the loads err by up to {off}; asperities with a load that are proved open: "
             f"{loaded}; check the solver"

@@ -282,7 +282,7 @@ def loops(
     chosen = indices("asperities", asperities, len(contact.scene))
     checks.fits_in_memory("points", points, 200 * len(contact.scene), noun="levels")
     levels, f = contact.cached(FrictionLevels), Fraction(checks.friction(contact.scene.friction))
-    loaded = levels.to_scene(levels.top.loads.value > 0)[chosen]
+    loaded = levels.loads[chosen] > 0
     widest = max(each.force_amplitude for each in cycles)
     way = (widest * (0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, points // 2 + 1)))[1:]).tolist()
     found = list[Loop]()

@@ -18,6 +18,7 @@ from convexrough import checks
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact, mean_pressures
 from convexrough.friction.cycle import Cycle
+from convexrough.friction.levels import FrictionLevels
 from convexrough.friction.state import states_of, stick_radii
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
@@ -144,5 +145,6 @@ def fretting_columns(worn: Sequence[Fretting]) -> dict[str, NDArray[Any]]:
         every |= {"asperity": np.arange(len(x)), "x": x, "y": y}
         every |= each.columns("status", "losses", "loss_errors")  # these columns come first
         every |= each.columns()
-        rows.append({name: column[each.contact.loads > 0] for name, column in every.items()})
+        loaded = each.contact.cached(FrictionLevels).loads > 0
+        rows.append({name: column[loaded] for name, column in every.items()})
     return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}

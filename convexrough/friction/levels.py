@@ -61,6 +61,12 @@ class FrictionLevels:
         """True if the normal solution at P is proved."""
         return self.top.box is not None
 
+    @cached_property
+    def loads(self) -> Array:
+        """(N,) [force] the loads at P of the solution, to which errors of `contact.loads` do not
+        contribute; 0 where an asperity is open."""
+        return self.to_scene(self.top.loads.value) * self.units.force
+
     @property
     def presses(self) -> int:
         """The number of normal problems solved so far, including the one at P."""

@@ -61,8 +61,8 @@ def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Arr
     checks.instance("contact", contact, Contact)
     f = Fraction(checks.friction(contact.scene.friction))
     asked = indices("which", which, len(contact.scene))
-    onsets, loaded = np.full(len(asked), np.nan), np.flatnonzero(contact.loads[asked])
     levels = contact.cached(FrictionLevels)
+    onsets, loaded = np.full(len(asked), np.nan), np.flatnonzero(levels.loads[asked])
     if not levels.top.problem.influence.stored and len(loaded) > MOST_ONSETS:
         expected = f"at most {MOST_ONSETS}: for each, several normal problems are solved"
         raise InputError("which", found=f"{len(loaded):,} loaded asperities", expected=expected)

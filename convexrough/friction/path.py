@@ -197,9 +197,9 @@ def history(contact: Contact, *, forces: ArrayLike) -> LoadPath:
     """
     checks.instance("contact", contact, Contact)
     f = checks.friction(contact.scene.friction)
-    Q = checks.bearable("forces", checks.array("forces", forces), f * contact.load)
-    checks.some("forces", Q)
     levels = contact.cached(FrictionLevels)
+    Q = checks.bearable("forces", checks.array("forces", forces), f * float(levels.load))
+    checks.some("forces", Q)
     points = [(levels.load, levels.height(force)) for force in Q.tolist()]
     return path_of(contact, Walk(levels, MemoryCurve.pressed(levels.load), points))
 

@@ -190,14 +190,15 @@ def shear(
     friction = checks.friction(contact.scene.friction)
     checks.exactly_one("force", force, "displacement", displacement)
     LOGGER.info("pressing at the load P - Q / f")
-    levels, loaded = contact.cached(FrictionLevels), contact.loads > 0
+    levels = contact.cached(FrictionLevels)
+    loaded = levels.loads > 0
     P, start = levels.load, MemoryCurve.pressed(levels.load)
     if displacement is None:
         assert force is not None  # exactly_one
         if shape := np.shape(force):
             raise InputError("force", found=f"shape {shape}", expected="one number")
         force = checks.finite("force", force)
-        checks.bearable("force", force, friction * contact.load)
+        checks.bearable("force", force, friction * float(P))
         height = levels.height(force)
     else:
         displacement = checks.finite("displacement", displacement)

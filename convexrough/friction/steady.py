@@ -90,7 +90,7 @@ def cycles(
         heights = [(T, -T) for T in tops]
     else:
         assert maximum is not None  # exactly_one
-        ranges = force_ranges(maximum, minimum, f * contact.load)
+        ranges = force_ranges(maximum, minimum, f * float(levels.load))
         checks.some("maximum", ranges[0])
         ends = zip(*(each.tolist() for each in ranges), strict=True)
         heights = [(levels.height(high), levels.height(low)) for high, low in ends]

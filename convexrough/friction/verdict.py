@@ -14,6 +14,7 @@ from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
+from convexrough.friction.levels import FrictionLevels
 from convexrough.friction.shear import ShearCertificate, ShearState, shear
 from convexrough.normal.claims import WITHIN, Claim, tolerance
 from convexrough.record import Record
@@ -57,8 +58,7 @@ class ShearVerdict(Claim, Record):
     @property
     def largest(self) -> float:
         """[force] the largest |claimed force|, or the largest limit f P_i if all claims are 0."""
-        limit = checks.friction(self.contact.scene.friction) * float(self.contact.loads.max())
-        return super().largest or limit
+        return super().largest or float(_limits(self.contact).max())
 
     @cached_property
     def wrongly_sliding(self) -> Indices:
@@ -72,7 +72,7 @@ class ShearVerdict(Claim, Record):
 
     def hints(self) -> Iterator[str]:
         yield from super().hints()
-        limits = checks.friction(self.contact.scene.friction) * self.contact.loads
+        limits = _limits(self.contact)
         close = np.abs(self.forces) >= (1.0 - WITHIN) * limits
         by_forces = (self.claimed == claims_sliding(self.contact, self.forces)).all()
         if by_forces and (count := int(close[self.wrongly_sticking].sum())):
@@ -122,7 +122,7 @@ def verify_shear(
         raise InputError("sliding", found=found, expected=expected)
     proved = state.certificate
     errors = (np.abs(given - state.forces) + proved.force_errors) * (1 + SAFETY)
-    limits = checks.friction(contact.scene.friction) * contact.loads
+    limits = _limits(contact)
     left = np.where(state.status == "sliding", NEAR_SLIDING * limits, limits - np.abs(state.forces))
     implied = (errors < left) | (state.status == "open")
     status = np.where(implied, state.status, "undecided")
@@ -161,5 +161,12 @@ def certify_shear(contact: Contact, forces: ArrayLike, *, force: float) -> Shear
 
 def claims_sliding(contact: Contact, forces: Array) -> NDArray[np.bool_]:
     """(n,) true where |force| is at least (1 - 1e-4) f P_i."""
-    limits = checks.friction(contact.scene.friction) * contact.loads
+    limits = _limits(contact)
     return np.asarray((limits > 0) & (np.abs(forces) >= (1.0 - CLAIMS_SLIDING) * limits))
+
+
+def _limits(contact: Contact) -> Array:
+    """(n,) [force] f P_i."""
+    return np.asarray(
+        checks.friction(contact.scene.friction) * contact.cached(FrictionLevels).loads
+    )

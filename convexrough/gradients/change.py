@@ -17,6 +17,7 @@ from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact, turned
 from convexrough.errors import InputError
+from convexrough.friction.levels import FrictionLevels
 from convexrough.friction.shear import ShearState
 from convexrough.gradients.gradient import control_held, levels
 from convexrough.gradients.parts import ZERO, Bending, Geometry, Part, product
@@ -159,14 +160,15 @@ def _pressed(
 
 def _gap_changes(contact: Contact, bent: _Bent, loads: Array, approach: float) -> Array:
     """(n,) [length] dA P + A dP - dd - dD0, the changes of open gaps, in float64; 0 elsewhere."""
-    scene, open_ones = contact.scene, contact.loads == 0.0
+    scene, pressed = contact.scene, contact.cached(FrictionLevels).loads
+    open_ones = pressed == 0.0
     if not open_ones.any():
         return np.zeros(len(scene))
     scale = 1.0 / (np.pi * scene.material.contact_modulus)
     influence = couple(scene, np.arange(len(scene)), scale, contact.influence)
-    moved = influence.apply(loads) - bent.modulus * influence.apply(contact.loads)
+    moved = influence.apply(loads) - bent.modulus * influence.apply(pressed)
     if (points := bent.everywhere.points.value).any():
-        moved += turned(influence, points, contact.loads)
+        moved += turned(influence, points, pressed)
     return np.where(open_ones, moved - bent.everywhere.offsets.value - approach, 0.0)
 
 

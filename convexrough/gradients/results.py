@@ -158,7 +158,7 @@ def onset_gradient(contact: Contact, asperity: int, *, holding: Holding | None =
     known = contact.cached(FrictionLevels)
     top, f, unit = known.top, known.coefficient, known.units.force
     which = indices("asperity", [asperity], len(contact.scene))[0]
-    if contact.loads[which] == 0.0:
+    if known.loads[which] == 0.0:
         expected = "an asperity that carries a load: others never slide"
         raise InputError("asperity", found=asperity, expected=expected)
     place, parts = int(top.problem.places[which]), []

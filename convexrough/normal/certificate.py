@@ -119,9 +119,8 @@ class Certificate(Proved):
         if self.other_solutions_cover:
             others.append("a contact disc that covers the summit of its nearest neighbour")
         if self.other_solutions_crowding > 0:
-            others.append(
-                f"crowding above {math.floor(self.other_solutions_crowding * 100) / 100:.2f}"
-            )
+            least = math.floor(self.other_solutions_crowding * 100) / 100
+            others.append(f"(a_i + a_j) / r_ij above {least:.2f} (a = 0 where open)")
         if others:
             return f"any other solution has {' and '.join(others)}"
         count = self.fixed_open

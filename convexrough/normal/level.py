@@ -215,9 +215,16 @@ class Level:
 
         right : (n,) the given right side;  total : the given sum of x
 
-        Raises SolverError if the system is singular or nearly singular.
+        Raises SolverError if no asperity is proved to touch, or if the system is singular or nearly
+        singular.
         """
         problem, springs, n = self.problem, self.springs, len(self.problem)
+        if not springs.slopes.any():
+            raise SolverError(
+                "the state has no derivative: no asperity is proved to touch",
+                solver="response",
+                advice="nothing follows from these loads: press again, or with a larger load",
+            )
         some = np.arange(n)
         if problem.influence.cheap_sums and springs.margin > 0:  # leave out those that are open
             some = np.flatnonzero(springs.touching | springs.doubtful)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, cast
@@ -18,7 +19,8 @@ from numpy.typing import NDArray
 
 from convexrough import checks, plots
 from convexrough.contact import Contact, press
-from convexrough.plausibility import CUT_OFF, array_extent, at_the_rim, ends
+from convexrough.errors import ConvexroughError
+from convexrough.plausibility import cautions_of
 from convexrough.record import Record, frame_of, rows_of, singular
 from convexrough.run.values import FileTable
 from convexrough.tabular.columns import aligned
@@ -84,11 +86,12 @@ class Stage(FileTable):
         return 0.0
 
     def cautions(self, contact: Contact) -> Iterator[str]:
-        """Warnings about loads and shear forces that are implausible for the pressed contact."""
+        """Warnings about loads and shear forces that are implausible for the pressed contact, or
+        at the largest load, if that is larger than the load of the contact."""
         load, name, known = self.highest_load, f"[{self.name}]", contact.load
         if not load:
             return
-        if known and not 1 / FAR <= load / known <= FAR:
+        if far := known and not 1 / FAR <= load / known <= FAR:
             yield (
                 f"{name} has loads up to {load:.4g}, and [normal] has the load {known:.4g}: check "
                 f"the units in both tables, and the key `reference` of {name}"
@@ -98,13 +101,13 @@ class Stage(FileTable):
                 f"{name} has shear forces up to {self.highest_force:.4g}, less than {SLIGHT:g} of "
                 "the friction limit at the largest load: check the units of the forces"
             )
-        scene, extent = contact.scene, array_extent(contact.scene, load)
-        inside = load > known and not ends(scene, contact.loads > 0)
-        if inside and ends(scene, np.full(len(scene), True)):  # a cylinder: press it further
-            top = press(scene, load=load, influence=contact.influence)
-            extent = 0.0 if ends(scene, top.loads > 0) else extent
-        if extent is not None and extent < CUT_OFF:
-            yield f"under the loads of {name} {at_the_rim(extent)}"
+        if load > known and not far:
+            with suppress(ConvexroughError):  # `compute` raises it
+                top = press(contact.scene, load=load, influence=contact.influence)
+                said = {*cautions_of(contact)}
+                for each in cautions_of(top):
+                    if each not in said:
+                        yield f"under the largest load of {name}: {each}"
 
     @classmethod
     def sheared_by(cls, keys: Any) -> str:

@@ -49,11 +49,11 @@ def refuse_coincident(points: Array) -> None:
         first = int(np.argmin(distances))
         others = np.hypot(*(points[first + 1 :] - points[first]).T)
         second = first + 1 + int(np.argmin(others))
-        raise InputError(
-            "positions",
-            found=f"asperities {first} and {second} (from 0) at a distance of {worst:g}",
-            expected="distinct positions" if worst <= rounding else f"a distance of {SIZED}",
-        )
+        expected = "distinct positions" if worst == 0 else f"a distance of {SIZED}"
+        if 0 < worst <= rounding:
+            expected = f"more than {rounding:.2g}, the rounding of such large coordinates"
+        found = f"asperities {first} and {second} (from 0) at a distance of {worst:g}"
+        raise InputError("positions", found=found, expected=expected)
 
 
 def nearest_distances(points: Array) -> Array:

@@ -176,7 +176,7 @@ class BristleProgram:
         pushed = raw.multipliers[: n * m].reshape(n, m) * m / problem.compliance(self.box)[:, None]
         loads = np.maximum(P[:, None] + e + pushed, 0.0).mean(axis=1)  # pushed is not positive
         approach = -float(raw.multipliers[-1]) if problem.approach is None else problem.approach
-        if problem.load is not None:
+        if problem.load is not None and loads.any():  # all may be below the tolerance of OSQP
             loads = loads * (problem.load / loads.sum())
         self.refuse_cut(loads)
         return ProgramAnswer(loads, approach, raw.iterations)

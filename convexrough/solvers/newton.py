@@ -92,7 +92,10 @@ class Pressing:
 
     def advice(self, state: newton.Iterate) -> str:
         """What to try, which depends on the convexity number where the method stopped."""
-        number = self.problem.convexity_number(state.forces)
+        loads = state.forces
+        if not loads.any():  # take those of single asperities
+            loads = hertz.load(self.problem.offsets + state.at.approach, self.problem.coefficients)
+        number = self.problem.convexity_number(loads)
         if number < 1:
             return (
                 f"the energy is convex (convexity number {number:.3g}): allow more steps, or "

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from attacks import ATTACKS, assert_honest, attack
 from friction_scenes import FRICTION, lengths, pressed
+from numpy.testing import assert_allclose
 from scenes import NAMED, PAPER_APPROACH, hexagonal, paper, reference
 
 import convexrough as cr
 from convexrough import FrictionNewton, shear_vector
 from convexrough.normal.problem import NormalProblem
-from convexrough.solvers import Newton
+from convexrough.solvers import BristleQP, Newton
 
 Spoil = Callable[[Any, np.random.Generator], Any]
 
@@ -29,6 +30,11 @@ class Liar:
 
     def solve(self, problem: Any, given: Any = None) -> Any:
         return self.spoil(self.honest().solve(problem, given), np.random.default_rng(self.seed))
+
+
+def unrefined(spoil: Callable[[Any], Any]) -> Liar:
+    """Its loads are those of the contact."""
+    return Liar(lambda found, rng: replace(found, loads=spoil(found.loads), refine=False))
 
 
 def of_loads(spoil: Spoil, seed: int = 0) -> Liar:
@@ -181,3 +187,33 @@ def test_a_solver_cannot_change_what_the_proof_uses() -> None:
     problem = NormalProblem.assemble(paper(), approach=PAPER_APPROACH)
     for each in (problem.offsets, problem.coefficients, problem.shells, problem.influence.matrix):
         assert not each.flags.writeable
+
+
+def test_friction_after_small_loads_on_open_asperities() -> None:
+    """Such loads, as interior-point methods leave them, gave open asperities a slip."""
+    scene, given = replace(paper(), friction=0.5), {"approach": PAPER_APPROACH}
+    residue = unrefined(lambda loads: loads + 1e-9 * loads.max())
+    contact, true = cr.press(scene, **given, solver=residue), cr.press(scene, **given)
+    assert (contact.loads > 0).all()
+    state, known = (cr.shear(each, force=0.1 * true.load) for each in (contact, true))
+    bounds = state.certificate.slip_errors + known.certificate.slip_errors
+    assert (np.abs(state.slips - known.slips) <= bounds).all()
+    assert not state.displacements[state.status == "open"].any()
+    onsets, right = cr.onset_of_sliding(contact), cr.onset_of_sliding(true)
+    assert_allclose(onsets, right, rtol=1e-12)  # nan where open
+    assert_allclose(cr.onset_of_sliding(cr.press(scene, **given, solver=BristleQP())), right)
+
+
+def test_limits_are_those_of_the_solution() -> None:
+    scene = replace(paper(), friction=0.5)
+    contact = cr.press(scene, load=3e-7, solver=unrefined(lambda loads: 2 * loads))
+    for call in (cr.shear, cr.cycle):
+        what = {"force" if call is cr.shear else "maximum": 0.4 * contact.load}
+        with pytest.raises(cr.InputError, match=r"1\.6 f P: gross sliding\), expected at most f P"):
+            call(contact, **what)
+
+
+def test_no_derivative_where_nothing_is_proved_to_touch() -> None:
+    contact = cr.press(paper(), approach=PAPER_APPROACH, solver=unrefined(lambda x: x[::-1]))
+    with pytest.raises(cr.SolverError, match="no asperity is proved to touch"):
+        contact.gradient(load=1.0)

@@ -8,7 +8,17 @@ from typing import Any
 import numpy as np
 import pytest
 from path_scenes import shaded
-from scene_files import EVERYTHING, FRICTION, HEXAGONAL, LOAD, WITHIN, put, rows, scene_text
+from scene_files import (
+    EVERYTHING,
+    FRICTION,
+    HEXAGONAL,
+    LOAD,
+    ONE_BODY,
+    WITHIN,
+    put,
+    rows,
+    scene_text,
+)
 
 import convexrough as cr
 from convexrough.friction import general_step
@@ -77,10 +87,10 @@ def test_what_is_only_checked_is_not_certified(read: Any) -> None:
 
 def test_an_array_for_the_largest_load_of_a_path(read: Any) -> None:
     """The pattern is wide enough for loads above that of [normal]; too narrow ones are told."""
-    path = FRICTION + "[path]\nloads = [1.2e-6, 1.2e-6]\nforces = [0.0, 1e-7]\n"
 
-    def run(within: str, load: str = "3e-8", radius: str = "1.0") -> tuple[cr.Contact, Any, Any]:
-        scene = read(HEXAGONAL + within, f"load = {load}", path, radius)
+    def run(within: str, low: str = "3e-8", high: str = "1.2e-6", radius: str = "1.0") -> Any:
+        path = FRICTION + f"[path]\nloads = [{high}, {high}]\nforces = [0.0, 1e-8]\n"
+        scene = read(HEXAGONAL + within, f"load = {low}", path, radius)
         contact = scene.press()
         return contact, scene.compute(contact)[1].found[0], list(scene.cautions(contact))
 
@@ -89,11 +99,26 @@ def test_an_array_for_the_largest_load_of_a_path(read: Any) -> None:
     assert not said
     assert grown.losses[-1] == pytest.approx(whole.losses[-1], rel=1e-12)
     *_, narrow = run("within = 0.0067")
-    assert [each for each in narrow if "under the loads of [path] contact reaches the rim" in each]
+    under = "under the largest load of [path]: "
+    assert [each for each in narrow if under + "contact reaches the rim" in each]
     long = "within = 0.0102\nheight_std = 2e-6\nseed = 3"
-    for load, ended in (("1e-9", True), ("1e-7", False)):  # at 1e-7 [normal] has warned of it
-        *_, said = run(long, load, "[inf, 1.0]")
-        assert any(each.startswith("under the loads of [path]") for each in said) == ended
+    for low, ended in (("1e-9", True), ("4e-8", False)):  # at 4e-8 [normal] has warned of it
+        *_, said = run(long, low, "5e-8", "[inf, 1.0]")
+        assert any(each.startswith(under + "contact reaches the ends") for each in said) == ended
+
+
+def test_every_warning_at_the_largest_load_of_a_path(read: Any) -> None:
+    soft = f"{ONE_BODY}\nhardness = 0.012"
+    path = FRICTION + "[path]\nloads = [1.2e-6]\nforces = [1e-7]\n"
+    found = {}
+    for load in ("3e-8", "1.2e-6"):
+        scene = read(f"{HEXAGONAL}within = 0.03", f"load = {load}", path, material=soft)
+        contact = scene.press()
+        found[load] = [*scene.cautions(contact)], contact.warnings
+    (low, none), (nothing, warned) = found.values()
+    assert "exceeds the hardness" in warned[0]
+    assert low == [f"under the largest load of [path]: {each}" for each in warned]
+    assert (none, nothing) == ((), [])
 
 
 def test_a_path_that_starts_and_ends_at_the_load_0(run: Any) -> None:
