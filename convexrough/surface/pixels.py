@@ -28,6 +28,11 @@ SIDES = ((0, 1), (1, 0), (0, -1), (-1, 0))
 #: Standard deviations, estimated from the quartiles, by which a spike differs from the median.
 OUTLYING = 6.0
 
+#: Least ratio of the second difference at a spike to those at the other pixels of AROUND. At the
+#: four nearest of them a spike causes a quarter of its own.
+ALONE = 3.0
+AROUND = np.arange(25).reshape(5, 5) != 12
+
 #: Approximate number of pixels in the sample in which `repeated` counts heights.
 SAMPLE = 2**17
 
@@ -113,7 +118,11 @@ def _crossings(
 
 def spikes(heights: Array) -> Indices:
     """(m, 2) row and column of outlying pixels of which at most one neighbour differs from them by
-    less than half of their difference from the median. Holes (nan) are neither."""
+    less than half of their difference from the median; and of pixels at which the second difference
+    is outlying, and ALONE times as large as at other pixels nearby. Holes (nan) are neither."""
+    bent = np.nan_to_num(np.abs(ndimage.laplace(heights, mode="mirror")))
+    others = ndimage.maximum_filter(bent, footprint=AROUND, mode="constant")
+    alone = (bent > OUTLYING * np.sqrt(np.mean(bent**2))) & (bent > ALONE * others)
     low, middle, high = np.nanquantile(heights, (0.25, 0.5, 0.75))
     away = np.abs(heights - middle)
     found = np.argwhere(away > OUTLYING * (high - low) / 1.349)
@@ -122,7 +131,8 @@ def spikes(heights: Array) -> Indices:
     for step in np.ndindex(3, 3):
         apart = np.abs(padded[tuple((found + step).T)] - heights[tuple(found.T)])
         alike += apart < away[tuple(found.T)] / 2  # this also counts the pixel itself
-    return found[alike <= 2]
+    alone[tuple(found[alike <= 2].T)] = True
+    return np.argwhere(alone)
 
 
 def clipped(heights: Array) -> int:

@@ -171,8 +171,7 @@ class Surface(Record, Plottable):
         """Warnings: of a form that explains most of the variance, and of pixels that look wrong.
 
         Forms are fitted to at most 256 by 256 of the pixels. One warning counts spikes: single
-        pixels or pairs of neighbours whose heights differ much from the median and from the heights
-        around them.
+        pixels or pairs of neighbours whose heights differ much from the heights around them.
 
         >>> ball = np.sqrt(50.0**2 - np.square(np.mgrid[-8:9, -8:9]).sum(axis=0))
         >>> rough = ball + np.random.default_rng(1).normal(size=(17, 17)) * 1e-3

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.ndimage import gaussian_filter
 
 import convexrough as cr
-from convexrough.surface.pixels import filled
+from convexrough.surface.pixels import filled, spikes
 
 RNG = np.random.default_rng(5)
 NOISE = 1e-3 * RNG.standard_normal((40, 60))
@@ -168,6 +169,11 @@ def test_spikes_and_drop_outs_are_named() -> None:
     (said,) = cr.surface.Surface(grooved, 10.0).warnings
     assert said.startswith("spikes or drop-outs: 3 pixels far from their neighbours, the first in")
     assert "in row 8, column 10; make them nan and use fill=True, or --fill" in said
+    resolved = gaussian_filter(RNG.normal(size=(100, 100)), 3.0)
+    assert len(spikes(resolved)) == 0
+    places = np.array([[3, 0], [20, 30], [50, 50], [70, 10], [99, 99]])
+    resolved[tuple(places.T)] += 3 * resolved.std() * np.array([1, -1, 1, -1, 1])
+    assert (spikes(resolved) == places).all()
 
 
 def test_a_map_that_is_cut_off_at_the_top_is_named() -> None:
