@@ -111,7 +111,7 @@ def cautions(normal: Mapping[str, Any], scene: Scene, approach: float) -> Iterat
     elif normal["loaded"] < FEW:
         yield (
             f"asperities in contact: {normal['loaded']}, fewer than {FEW}: too few for a rough "
-            "surface; check the units of the spacing, the heights and the approach or load"
+            "surface; check the units of modulus, radii, spacing, heights and approach or load"
         )
     if normal["extent"] > STEEP:
         yield (

@@ -186,7 +186,7 @@ def test_an_array_that_ends_inside_the_contact_is_told() -> None:
         *((wide, wrong, {"approach": 5e-5}, rim) for wrong in (1e3, (1.0, 2e3))),
         (wide, (1.0, 2.0), {"approach": 2e-5}, ""),
         (seven, 1e3, {"approach": 5e-5}, rim),
-        (one, 1e3, {"approach": 5e-5}, "asperities in contact: 1, fewer than 5"),
+        (one, 1e3, {"approach": 5e-5}, "surface; check the units of modulus, radii, spacing, heig"),
         (wide, 1.0, {"approach": 9e-5}, "100% of the asperities at the rim of the array touch; as"),
         (wide, 1.0, {"approach": 5e-5}, ""),
         (wide, (np.inf, 1.0), {"approach": 5e-5}, "the ends of the array along the axis of the"),
