@@ -261,8 +261,8 @@ def _numbers(
     """The numbers of a column; wrong cells are added to `mistakes`."""
     if holes:
         cells = ["nan" if str(cell).lower() in HOLES else cell for cell in cells]
-    check = checks.positive if COLUMNS.get(name, roles.Column()).positive else checks.finite
-    style = source.style
+    style, column = source.style, COLUMNS.get(name, roles.Column())
+    check = checks.positive if column.positive else checks.finite
     numbers = style.numbers(cells)
     if numbers is None and not any(map(str, cells)):
         saved = "formulas are empty until a spreadsheet program saves their values"
@@ -272,7 +272,9 @@ def _numbers(
         found = map(style.number, cells)
         numbers = np.array([np.inf if number is None else number for number in found])
     sizes = np.abs(numbers)
-    fine = (sizes >= checks.SMALLEST) & (sizes <= checks.LARGEST) | (sizes == 0)
+    # However small a load is, it claims contact unless a floor counts it as 0.
+    least = 0.0 if column.kind in ("force", "pressure") else checks.SMALLEST
+    fine = (sizes >= least) & (sizes <= checks.LARGEST) | (sizes == 0)
     fine &= (numbers > 0) | (check is checks.finite)
     fine |= np.isnan(numbers) & holes
     for i in np.flatnonzero(~fine).tolist():

@@ -71,7 +71,7 @@ class Manner(Reading):
     def __post_init__(self) -> None:
         if self.tolerance is not None:
             checks.positive("--tolerance", self.tolerance)
-        checks.non_negative("--floor", self.floor)
+        checks.between("--floor", self.floor, 0, checks.LARGEST)
 
 
 class Claimed(NamedTuple):

@@ -159,7 +159,7 @@ def verify_on(
     problem: NormalProblem, loads: ArrayLike, *, within: float = WITHIN, floor: float = 0.0
 ) -> Verdict:
     """The verdict of `verify` for an assembled problem."""
-    floor = checks.non_negative("floor", floor)
+    floor = checks.between("floor", floor, 0, checks.LARGEST)
     within = tolerance("within", within)
     checks.in_order("loads", loads)
     given = checks.array("loads", loads, length=len(problem.scene))
