@@ -17,7 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough.arrays import Array
 from convexrough.contact import Contact
 from convexrough.plots import style
-from convexrough.plots.style import COLOURS, DASHED, FAINT, SMOOTH, Scale
+from convexrough.plots.notebook import Figure, panels
+from convexrough.plots.style import COLOURS, DASHED, DOUBLE, FAINT, SINGLE, SMOOTH, Scale
 
 #: DENSE or more discs are stored as pixels in vector files. CROWDED or more discs are replaced by a
 #: mosaic, an image in which each pixel has the colour of the nearest asperity, or a mean.
@@ -95,6 +96,35 @@ def draw_map(
     axes.xaxis.set_major_locator(style.round_ticks(5))
     axes.yaxis.set_major_locator(style.round_ticks(5))
     style.label(axes, length.label("x"), length.short("y"))
+
+
+def columns_of(count: int) -> int:
+    """The number of columns of a figure of so many maps."""
+    return count if count <= 4 else 3 if count in (5, 6, 9) else 4
+
+
+def tiles(count: int, lines: int) -> tuple[Figure, list[Axes]]:
+    """A new figure of so many maps that share their axes, below titles of so many lines."""
+    columns = columns_of(count)
+    rows, width = -(-count // columns), SINGLE if columns == 1 else DOUBLE
+    height = rows * ((width - 0.5) / columns + 0.17 * lines) + (0.95 if columns == 1 else 0.75)
+    figure, places = panels(width, height, rows, columns, sharex=True, sharey=True)
+    for axes in places[count:]:
+        axes.remove()
+    return figure, places[:count]
+
+
+def label_tiles(figure: Figure, places: Sequence[Axes], x: str, y: str) -> None:
+    """Label the axes of the maps of `tiles` once, with numbers at the outer ones only."""
+    columns = columns_of(len(places))
+    for axes in places:
+        axes.set(xlabel="", ylabel="")
+        if columns == 4:
+            axes.xaxis.set_major_locator(style.round_ticks(4))
+    for axes in places[-columns:]:
+        axes.tick_params(labelbottom=True)
+    figure.supxlabel(x, fontsize=style.LABEL)
+    figure.supylabel(y, fontsize=style.LABEL)
 
 
 def draw_values(

@@ -13,7 +13,7 @@ from matplotlib.colors import ListedColormap, Normalize
 from convexrough.arrays import Array
 from convexrough.friction.path import LoadPath, history, load_path
 from convexrough.plots import style
-from convexrough.plots.asperity_map import draw_map, status_layers
+from convexrough.plots.asperity_map import draw_map, label_tiles, status_layers, tiles
 from convexrough.plots.notebook import Figure, Figures, no_contact, panels
 from convexrough.plots.steady import PATTERNS, label_plane, name_statuses, vertices
 from convexrough.plots.style import DOUBLE, FAINT, SMOOTH, TICK, Scale
@@ -135,25 +135,25 @@ def _mark_points(axes: Axes, x: Array, y: Array) -> None:
 
 
 def _maps(path: LoadPath, scale: Scale) -> Figure:
-    """Maps of stick and slip at some points, all in the same square."""
+    """Maps of stick and slip at some points, all in the same square, with P and Q as titles."""
     chosen = evenly_chosen(range(len(path.loads)), MOST_MAPS)
-    columns = min(4, len(chosen))
-    rows = -(-len(chosen) // columns)
-    figure, places = panels(DOUBLE, 0.5 + 1.9 * rows, rows, columns)
+    figure, places = tiles(len(chosen), 2)
     scene, modulus = path.scene, path.scene.material.contact_modulus
     radii = hertz.contact_radius(path.asperity_loads, modulus, scene.relative_radii)
     room = radii[chosen].max(axis=0)
-    for axes, k in zip(places, chosen, strict=False):
+    unit = style.measure(float(path.loads.max()), scene.units.force, "P_m")
+    named = f"${unit.symbol}$" if unit.symbol else style.literal(unit.said)
+    for axes, k in zip(places, chosen, strict=True):
         layers = status_layers(path.status[k], radii[k])
         draw_map(axes, scale.points, scale.length, layers, room=room)
         slide = np.count_nonzero(path.status[k] == "sliding")
         touch = np.count_nonzero(path.asperity_loads[k] > 0)
-        style.title(axes, f"{k + 1}: {slide:,} of {touch:,} slide", "center")
-        axes.set(xlabel="", ylabel="")
-        axes.tick_params(labelbottom=False, labelleft=False)
-    for axes in places[len(chosen) :]:
-        axes.set_axis_off()
-    name_statuses(figure, path.status[chosen])
+        forces = f"$P$ = {unit.of(path.loads[k]):.3g}, $Q$ = {unit.of(path.forces[k]):.3g} {named}"
+        said = f"{k + 1}: {forces}\n{slide:,} of {touch:,} slide".replace("-", "\u2212")
+        style.title(axes, said, "center")
+    x = scale.length.label("x") + (f"    (${unit.symbol}$ = {unit.said})" if unit.symbol else "")
+    label_tiles(figure, places, x, scale.length.short("y"))
+    name_statuses(figure, path.status[chosen], "outside upper center")
     return figure
 
 

@@ -13,8 +13,8 @@ from matplotlib.lines import Line2D
 from convexrough.friction.shear import ShearState
 from convexrough.plots import asperity_map as maps
 from convexrough.plots import style
-from convexrough.plots.notebook import Figures, no_contact, panels
-from convexrough.plots.style import DASHED, DOTTED, DOUBLE, FAINT, LABEL, SINGLE, SMOOTH, Scale
+from convexrough.plots.notebook import Figures, no_contact
+from convexrough.plots.style import DASHED, DOTTED, FAINT, SMOOTH, Scale
 from convexrough.scene.rings import evenly_chosen
 from convexrough.vector_shear.state import VectorShearState
 
@@ -38,25 +38,14 @@ def shear_figures(states: Sequence[ShearState]) -> Figures:
     if not states[0].contact.loads.any():
         return no_contact("stick_slip")
     scale, shown = Scale(states[0].contact), evenly_chosen(states, MOST_PANELS)
-    columns = len(shown) if len(shown) <= 4 else 3 if len(shown) in (5, 6, 9) else 4
-    rows = -(-len(shown) // columns)
-    width = SINGLE if columns == 1 else DOUBLE
-    above = 0.17 * (1 + (columns == 4) + any(style.not_proved(state) for state in shown))
-    height = rows * ((width - 0.5) / columns + above) + (0.95 if columns == 1 else 0.75)
-    figure, places = panels(width, height, rows, columns, sharex=True, sharey=True)
-    for axes, state in zip(places, shown, strict=False):
+    columns = maps.columns_of(len(shown))
+    lines = 1 + (columns == 4) + any(style.not_proved(state) for state in shown)
+    figure, places = maps.tiles(len(shown), lines)
+    for axes, state in zip(places, shown, strict=True):
         draw_state(axes, state, scale)
         _title(axes, state, scale, "\n" if columns == 4 else " ")
-        axes.set(xlabel="", ylabel="")
-        if columns == 4:
-            axes.xaxis.set_major_locator(style.round_ticks(4))
-    for axes in places[len(shown) :]:
-        axes.remove()
-    for axes in places[len(shown) - columns : len(shown)]:
-        axes.tick_params(labelbottom=True)
-    limit = f"$fP$ = {style.quantity(scale.limit, scale.units.force)}"
-    figure.supxlabel(f"{scale.length.label('x')}    ({limit})", fontsize=LABEL)
-    figure.supylabel(scale.length.short("y"), fontsize=LABEL)
+    x = f"{scale.length.label('x')}    ($fP$ = {style.quantity(scale.limit, scale.units.force)})"
+    maps.label_tiles(figure, places, x, scale.length.short("y"))
     handles, loc, ncols = legend_handles(shown, scale), "outside upper center", min(2 * columns, 4)
     style.legend(figure, "outside", handles=handles, loc=loc, ncols=ncols)
     return Figures({"stick_slip": figure})

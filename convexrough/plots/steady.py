@@ -83,11 +83,12 @@ def draw_losses(axes: Axes, found: PhaseLosses) -> None:
     style.label(axes, "phase [°]  (90: P and Q in phase)", unit.label(r"W\,/\,\mathrm{factor}^3"))
 
 
-def name_statuses(figure: Figure, status: NDArray[np.str_]) -> None:
+def name_statuses(
+    figure: Figure, status: NDArray[np.str_], loc: str = "outside lower center"
+) -> None:
     """Add a legend of the statuses that occur."""
     if handles := status_handles(status):
-        loc, count = "outside lower center", len(handles)
-        style.legend(figure, "outside", handles=handles, loc=loc, ncols=count)
+        style.legend(figure, "outside", handles=handles, loc=loc, ncols=len(handles))
 
 
 def draw_curve(axes: Axes, curve: MemoryCurve) -> None:

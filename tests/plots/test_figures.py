@@ -154,6 +154,10 @@ def test_the_path_and_its_memory_are_drawn() -> None:
     assert cost.lines[0].get_ydata()[-1] == pytest.approx(path.losses[-1] / W0)
     place = figures["path_stick_slip"].axes[3]
     assert discs(place, "sliding") == int((path.status[3] == "sliding").sum())
+    said = [text.get_text() for text in texts(figures["path_stick_slip"])]
+    assert "4: $P$ = 1, $Q$ = \u22120.075 $P_m$\n6 of 37 slide" in said
+    assert [text.count("P_m$ = ") for text in said if text.startswith("$x")] == [1]
+    assert said.count("\u22121") == 2 + 4
 
 
 def test_what_a_closed_path_settles_to() -> None:
