@@ -21,8 +21,9 @@ FINE = 240
 def shakedown_figures(found: Shakedown) -> Figures:
     """The figures of a shakedown limit, with dimensionless forces. P0 is the mean load.
 
-    "shakedown" : for each asperity, the largest factor of the path at which its sliding dies out;
-        for the kind "vector", its slip in the mechanism
+    "shakedown" : for each asperity, the largest factor of the path at which its sliding dies out,
+        or above which it opens, if that limits the path; for the kind "vector", its slip in the
+        mechanism
     "shakedown_map" : number of asperities that slide or open in every cycle, against the amplitudes
         of load and shear; at constant load, against mean and amplitude of the shear force. Only for
         the kind "exact", and if more than one asperity has a factor
@@ -56,11 +57,13 @@ def draw_factors(axes: Axes, found: Shakedown) -> None:
     ]
     length = style.measure(float(np.ptp(points)), found.scene.units.length)
     draw_map(axes, points, length, layers)
-    ringed = "\nringed: the first to keep sliding" if first.any() else ""
+    keeps, least = "keep sliding", "factor up to which sliding dies out"
+    if found.limited_by == "opening":
+        keeps, least = "open in every cycle", "factor above which it opens"
+    ringed = f"\nringed: the first to {keeps}" if first.any() else ""
     style.title(axes, f"{found.kind}: {found.factor:.5g}{ringed}")
     if high > low:
-        what = "slip in the mechanism [1]" if vector else "factor up to which sliding dies out"
-        style.bar(axes, colours, what)
+        style.bar(axes, colours, "slip in the mechanism [1]" if vector else least)
 
 
 def _fall(found: Shakedown, along: Array, across: Array) -> Array:

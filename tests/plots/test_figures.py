@@ -160,6 +160,17 @@ def test_the_path_and_its_memory_are_drawn() -> None:
     assert said.count("\u22121") == 2 + 4
 
 
+def test_what_limits_shakedown_is_said() -> None:
+    P, swing = LARGEST["paper"], LARGEST["paper"] * np.array([-0.4, 0.4])
+    for part, kept in ((0.0, "open in every cycle"), (1.0, "keep sliding")):
+        p, q = (1 - part) * swing, part * swing
+        found = cr.shakedown(PAPER, load=P, load_amplitudes=p, force_amplitudes=q)
+        figure = plots.shakedown_figures(found)["shakedown"]
+        fits(figure)
+        assert figure.axes[0].get_title("left").endswith(f"\nringed: the first to {kept}")
+        assert ("opens" in figure.axes[1].get_ylabel()) == ("open" in kept)
+
+
 def test_what_a_closed_path_settles_to() -> None:
     P, named = LARGEST["paper"], dataclasses.replace(PAPER, units=("µm", "mN"))
     found = cr.steady(named, loads=[0.9 * P, 0.5 * P], forces=[0.2 * P, -0.2 * P])
