@@ -152,7 +152,7 @@ def _say_summary(folder: Path, output: common.Output) -> int:
         with common.progress("writing results"), output.folder(output.out) as new:
             left_out = report.write_summary(new, table, found)
         lines += [*common.written(new), *left_out]
-    output.say({**said, "quantiles": rows_of(found)}, lines)
+    output.say({**said, "quantiles": rows_of(found)}, lines, report.cautions(table))
     return _status(said)
 
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from convexrough.arrays import Array
+from convexrough.arrays import Array, Indices
 from convexrough.plots.notebook import new_axes
-from convexrough.plots.style import DOUBLE, ROUGH, TICK, UNSURE, legend
+from convexrough.plots.style import DOUBLE, ROUGH, SMOOTH, TICK, UNSURE, legend
 from convexrough.sweeps.batch import Columns
 
 #: Quantiles that are drawn: the ends of the two bands and, in the middle, the line.
@@ -28,7 +28,8 @@ LOOKS = ((ROUGH, "-", "o"), (UNSURE, "--", "s"), ("0.25", ":", "^"), ("#4f8a4f",
 def draw_quantiles(
     columns: Columns, measured: str, over: str, others: Sequence[str], axes: Axes | None = None
 ) -> Axes:
-    """Axes with the median, and bands from 5 to 95 % and 25 to 75 %, of rows that did not fail.
+    """Axes with the median, and bands from 5 to 95 % and 25 to 75 %, of rows that did not fail;
+    the marker is open where a row is undecided.
 
     others : other swept keys that are not random. Up to `MOST_BANDS` combinations of their values
         have bands of their own; otherwise the legend states the number of combinations
@@ -37,12 +38,17 @@ def draw_quantiles(
     good = columns["status"] != "failed"
     rows = {name: values[good] for name, values in columns.items()}
     for (name, band), look in zip(_bands(rows, others), cycle(LOOKS), strict=False):
-        _draw_band(axes, band[over], band[measured], name, look)
+        _draw_band(axes, band[over], band[measured], band["status"] == "undecided", name, look)
+    if (rows["status"] == "undecided").any():
+        axes.plot([], [], "o", ms=5, color=SMOOTH, mfc="white", label="with undecided scenes")
     if failed := int(np.count_nonzero(~good)):
         axes.set_title(f"{failed:,} scenes failed", fontsize=TICK, loc="left")
     x = rows[over]
     if len(x) and x.dtype.kind != "U" and x.min() > 0 and x.max() > 30 * x.min():
         axes.set_xscale("log")
+    low, high = axes.dataLim.intervaly
+    if 0 < 300 * low < high:
+        axes.set_yscale("log")
     axes.margins(x=0.02)
     legend(axes, "above", ncols=2)
     return axes
@@ -65,24 +71,28 @@ def _bands(columns: Columns, others: Sequence[str]) -> Iterator[tuple[str, Colum
     yield usual, columns
 
 
-def _draw_band(axes: Axes, x: Any, y: Array, name: str, look: tuple[str, str, str]) -> None:
+def _draw_band(
+    axes: Axes, x: Any, y: Array, unsure: Any, name: str, look: tuple[str, str, str]
+) -> None:
     colour, line, marker = look
     if len(x) == 0:
         return
-    places, parts = _grouped(x, y)
-    known = [part[np.isfinite(part)] for part in parts]
+    places, groups = _grouped(x)
+    known = [y[each][np.isfinite(y[each])] for each in groups]
     rows = [np.quantile(part, AT) if len(part) else np.full(len(AT), np.nan) for part in known]
     low, lower, middle, upper, high = np.array(rows).T
     if max(map(len, known)) > 1:
         axes.fill_between(places, low, high, color=colour, alpha=0.16, lw=0)
         axes.fill_between(places, lower, upper, color=colour, alpha=0.30, lw=0)
     axes.plot(places, middle, color=colour, ls=line, marker=marker, ms=3, lw=1.2, label=name)
+    there = [unsure[each].any() for each in groups]
+    axes.plot(places[there], middle[there], marker, ms=5, color=colour, mfc="white")
 
 
-def _grouped(x: Any, y: Array) -> tuple[Any, list[Array]]:
-    """The values of x, and all y at each value; for many values, the medians of x in bins."""
+def _grouped(x: Any) -> tuple[Any, list[Indices]]:
+    """The values of x, and the rows of each value; for many values, the medians of x in bins."""
     different, back = np.unique(x, return_inverse=True)
-    if len(different) <= max(BINS, len(y) // 4):
-        return different, [y[back == i] for i in range(len(different))]
+    if len(different) <= max(BINS, len(x) // 4):
+        return different, [np.flatnonzero(back == i) for i in range(len(different))]
     bins = np.array_split(np.argsort(x), BINS)
-    return np.array([np.median(x[each]) for each in bins]), [y[each] for each in bins]
+    return np.array([np.median(x[each]) for each in bins]), bins

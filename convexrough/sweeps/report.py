@@ -57,17 +57,18 @@ def describe_quantiles(found: Columns) -> list[str]:
 
 def cautions(table: SweepTable) -> Iterator[str]:
     """Warnings: the messages of the first `MOST_NAMED` scenes that failed, stages with loads of
-    their own, and messages of certified scenes."""
+    their own, and the first messages of undecided and of certified scenes."""
     yield from islice(_messages(table, "failed"), MOST_NAMED)
     for name in table.manifest.get("own_loads", []):  # manifests of earlier versions lack it
         yield (
             f"[{name}] has its own loads, which do not vary with the load of [normal]: sweep them, "
             f"or their factor {name}.reference, together with that load in [sweep.together]"
         )
-    said = _messages(table, "certified")
-    if first := next(said, ""):
-        count = 1 + sum(1 for _ in said)
-        yield f"{count:,} certified scenes of {len(table):,} have warnings, the first {first}"
+    for status, what in (("undecided", ""), ("certified", " with warnings")):
+        said = _messages(table, status)
+        if first := next(said, ""):
+            count = 1 + sum(1 for _ in said)
+            yield f"{status} scenes{what}: {count:,} of {len(table):,}; the first is {first}"
 
 
 def _messages(table: SweepTable, status: str) -> Iterator[str]:

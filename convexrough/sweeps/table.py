@@ -205,8 +205,8 @@ class SweepTable(Record):
 
         There is a row for each computed grid point and each measured number. The columns are those
         of `points`, `quantity` (the name of the number), `scenes` (number of computed scenes),
-        `failed` (number of failed scenes), and quantiles of the values that are not nan (nan if
-        there are none).
+        `undecided` and `failed` (numbers of such scenes), and quantiles of the values that are not
+        nan (nan if there are none).
 
         Raises InputError for unknown names, and for quantiles that are not from 0 to 1.
         """
@@ -216,7 +216,7 @@ class SweepTable(Record):
         about = self.read([*self.points, "scene", "status"])
         ends = np.flatnonzero(np.diff(about["scene"] // int(self.manifest["each"]))) + 1
         points = np.split(np.arange(len(about["scene"])), ends) if len(about["scene"]) else []
-        good = about["status"] != "failed"
+        good, doubtful = about["status"] != "failed", ("undecided", "failed")
         rows: list[tuple[Any, ...]] = []
         for name in names:
             values = self.read([name])[name]
@@ -224,10 +224,10 @@ class SweepTable(Record):
                 known = values[point][good[point] & ~np.isnan(values[point])]
                 found = _quantiles(known, at) if len(known) else np.full(len(at), np.nan)
                 keys = (about[key][point[0]] for key in self.points)
-                failed = np.count_nonzero(~good[point])
-                rows.append((place, *keys, name, len(point), failed, *found))
+                counts = ((about["status"][point] == it).sum() for it in doubtful)
+                rows.append((place, *keys, name, len(point), *counts, *found))
         rows.sort(key=lambda row: row[0])
-        heads = (*self.points, "quantity", "scenes", "failed", *(f"{part:g}" for part in at))
+        heads = (*self.points, "quantity", "scenes", *doubtful, *(f"{part:g}" for part in at))
         return {head: np.array([row[i] for row in rows]) for i, head in enumerate(heads, 1)}
 
     def _said(self, name: str) -> str:

@@ -190,13 +190,33 @@ def test_what_is_refused(whole: cr.SweepTable) -> None:
             call()
 
 
-def test_what_is_not_proved_is_said() -> None:
+@pytest.mark.usefixtures("no_processes")
+def test_what_is_not_proved_is_said_counted_and_marked(command: Any, tmp_path: Path) -> None:
     graze = sweeping(over={"normal.approach": [0.0, 5e-5]})
     graze["normal"] = {}
     table = swept(graze)
     said = "not certified: undecided asperities: 1; "
     said += "no asperity carries a load: check the sign and unit of the approach"
     assert numbers(table, "status", "message") == [["undecided", "certified"], [said, ""]]
+    assert table.quantiles()["undecided"].tolist() == [1, 0]
+    axes = table.plot()
+    (open_at,) = [
+        line for line in axes.lines if line.get_mfc() == "white" and len(line.get_xdata())
+    ]
+    assert open_at.get_xydata().tolist() == [[0.0, 0.0]]
+    assert axes.get_legend().get_texts()[-1].get_text() == "with undecided scenes"
+    (tmp_path / "a.toml").write_text(toml(graze))
+    for asked in (("a.toml", "--workers", "1"), ("--summary", "a-sweep")):
+        status, _, err = command("sweep", *asked)
+        assert status == 3
+        assert err.startswith(
+            f"convexrough: warning: undecided scenes: 1 of 2; the first is scene 0: {said}"
+        )
+
+
+def test_numbers_of_several_decades_have_a_logarithmic_axis() -> None:
+    table = swept(sweeping(over={"normal.load": [1e-10, 3e-7]}, measure=["load", "contact"]))
+    assert [table.plot(name).get_yscale() for name in ("load", "contact")] == ["log", "linear"]
 
 
 def test_data_frames(whole: cr.SweepTable, folder: Path) -> None:
