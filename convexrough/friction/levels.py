@@ -86,6 +86,11 @@ class FrictionLevels:
             self._named[load] = self._levels.at(ball)
         return self._named[load]
 
+    def has(self, load: Fraction) -> bool:
+        """True if the load of this level is proved positive: not for a number near 0 if P is
+        rounded."""
+        return load > 0 and bool(self._balls([load])[0].positive)
+
     def prepare(self, loads: Iterable[Fraction]) -> None:
         """Compute the levels at these loads together, if this is cheaper than one by one."""
         new = sorted({x for x in loads if x not in self._named and 0 < x < self.load})

@@ -90,8 +90,8 @@ def _enclosed(levels: FrictionLevels, asperity: int) -> Onset:
     near = [s for s in levels.known if around[0] <= abs(s - found) <= around[ENOUGH]]
     below = [*(s for s in near if s < found), *(found - part for part in around)]
     above = [*(s for s in near if s > found), *(found + part for part in around)]
-    lower = next((s for s in below if s > 0 and levels.at(s).open[place]), Fraction(0))
-    sure = (s for s in above if s < levels.load and levels.at(s).touching[place])
+    lower = next((s for s in below if levels.has(s) and levels.at(s).open[place]), Fraction(0))
+    sure = (s for s in above if s < levels.load and levels.has(s) and levels.at(s).touching[place])
     return Onset(found, lower, next(sure, levels.load))
 
 
@@ -121,6 +121,8 @@ def root(levels: FrictionLevels, place: int) -> Fraction:
             following = (low + high) / 2
         here = Fraction(float(following))
         here += Fraction(float(following - here))  # a fraction with few digits
+        if not levels.has(here):  # 0 up to rounding
+            return Fraction(0)
     return here
 
 

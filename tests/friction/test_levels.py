@@ -123,3 +123,11 @@ def test_a_response_to_what_is_hardly_known_is_no_failure() -> None:
     right = Ball.around(np.linspace(0.0, 1.0, len(level.problem)), 10.0)
     found = level.response(right, Ball.exact(0.0))
     assert np.isfinite(found.loads.radius).all()
+
+
+@pytest.mark.parametrize("radius", [1e12, 1e20])
+def test_onsets_on_a_body_that_is_nearly_flat(radius: float) -> None:
+    """Asperities touch one after another at loads that are 0 up to the rounding of P."""
+    scene = replace(hexagonal(within=0.0052), sphere_radius=radius, friction=0.5)
+    contact = cr.press(scene, approach=1.8789852661499484e-05)
+    assert_allclose(cr.onset_of_sliding(contact), 0.5 * contact.load, rtol=1e-12)
