@@ -87,12 +87,13 @@ def places_of(
     """Places, from 0, of wanted columns by name; and mistakes, in which `found` shows `names`."""
     bared = [bare(name) for name in names]
     lowered = [each.lower() for each in bared]
+    spelt = [re.sub(r"[\s-]+", "_", each.strip()) for each in lowered]  # as in `COLUMNS`
     places: dict[str, int] = {}
     mistakes: list[str] = []
     for name in wanted:
         called = how.columns.get(name)
         if called is None:
-            alike = [i for i, each in enumerate(lowered) if each in (name, *COLUMNS[name].also)]
+            alike = [i for i, each in enumerate(spelt) if each in (name, *COLUMNS[name].also)]
         else:  # the header as it is, without its unit, in lower case
             ways = ((names, called), (bared, called), (lowered, called.lower()))
             ranks = ([i for i, each in enumerate(known) if each == it] for known, it in ways)

@@ -14,6 +14,7 @@ import convexrough as cr
 from convexrough.run.asperity_file import read_summits
 from convexrough.run.scene_file import read_scene
 from convexrough.tabular.roles import Reading
+from convexrough.tabular.units import UnitNames
 from convexrough.verdict.claims import Claimed, Manner, read_shear_forces
 from convexrough.verdict.claims import read_loads as read_with
 
@@ -254,6 +255,13 @@ def test_summits(tmp_path: Path) -> None:
     assert asperities.positions.tolist() == [[0.25, 0.5], [2.0, -1.0]]
     assert asperities.tip_radii.tolist() == [0.1, 0.2]
     assert asperities.heights.tolist() == [1e-3, -1e-3]
+
+
+@pytest.mark.parametrize("name", ["tip radius", "Tip-Radius", "TIP  RADIUS (m)", "tip\nradius"])
+def test_the_spelling_of_a_heading(tmp_path: Path, name: str) -> None:
+    path = tmp_path / put(tmp_path, [[["x", "y", name], [0, 1, 2]]], "a.xlsx")
+    how = Reading(units=UnitNames("m"))
+    assert read_summits(path, tip_radius=None, how=how).tip_radii.tolist() == [2]
 
 
 def test_summits_without_a_header(tmp_path: Path) -> None:
