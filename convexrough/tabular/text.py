@@ -207,6 +207,10 @@ def read_text_table(
     if not rows:
         raise FileError(f"{path}: empty")
     above, (header, rows) = rows, _headed(rows, titles, style, known, is_map)
+    if header and not is_map and (also := _also_heading(header, above, style, known)):
+        found = f"rows {min(header.number, also)} and {max(header.number, also)}: found a heading"
+        expected = "the names of all columns in one row: unmerge cells and delete the other row"
+        raise FileError(f"{path}: {found} over two rows, expected {expected}")
     top = header.number if header and header.number else rows[0].number
     comments += [row.text for row in above if row.number < top]
     if header:
@@ -267,6 +271,21 @@ def _headed(
         names = apart if len(apart) == width < len(names) else names
         rows = _unlisted(line, rows, first, style)
     return line._replace(cells=names), rows
+
+
+def _also_heading(header: TextRow, rows: list[TextRow], style: Style, known: Sequence[str]) -> int:
+    """The number of a row above or below the header that names columns which the header does not
+    name, as under merged cells of a sheet; 0 if there is none."""
+    for row in rows[: SAMPLE + 1] if style.separator != " " else ():
+        if abs(row.number - header.number) != 1 or _are_units(row.cells):
+            continue
+        columns = zip_longest(header.cells, row.cells, rows[-1].cells, fillvalue="")
+        names = [cell for name, cell, last in columns if cell and last and not name]
+        sure = row.number > header.number or len(names) > 1  # one may be a title, above an index
+        sure = sure or any(bare(name).lower() in known for name in names)
+        if names and sure and all(style.number(cell) is None for cell in row.cells):
+            return row.number
+    return 0
 
 
 def _are_units(cells: Sequence[str]) -> bool:

@@ -47,6 +47,7 @@ FILES = {
     "header in a comment": "# x y load\n" + ROWS.replace(",", " "),
     "more columns": "id,x,status,y,load,gap\n7,0,ok,0,1.5,\n8,1,ok,0,0,1\n9,0.5,no,2.5,2.5e-5,\n",
     "pandas": ",x,y,load\n0,0,0,1.5\n1,1,0,0\n2,0.5,2.5,2.5e-5\n",
+    "a title above pandas": "Loads,,,\n,x,y,load\n0,0,0,1.5\n1,1,0,0\n2,0.5,2.5,2.5e-5\n",
     "R": '"x" "y" "load"\n"1" 0 0 1.5\n"2" 1 0 0\n"3" 0.5 2.5 2.5e-5\n',
     "separators at the ends of rows": "x,y,load\n" + ROWS.replace("\n", ",,\n"),
     "Fortran": "x,y,load\n0.0D+00,0,0.15D+01\n1,0,0.D0\n0.5,2.5,2.5d-5\n",
@@ -292,6 +293,10 @@ def test_summits_without_a_header(tmp_path: Path) -> None:
             for each in ("height_mm", "Height mm", "z in mm", "HEIGHT.mm", "height_in_mm")
         ),
         ("# heights x 1000\nx,y,z\n0,0,1\n", "found '# heights x 1000', expected no factor of the"),
+        *(
+            (f"{each}\n,,height,tip_radius\n0,0,1,2\n", "rows 1 and 2: found a heading o")
+            for each in ("x,y,Summit,", "X-Koordinate,Y-Koordinate,Summit,")
+        ),
         ("# units: micrometres\nx,y,z\n0,0,1\n", "found '# units: micrometres', expected units in"),
     ],
 )
