@@ -257,10 +257,10 @@ def tasks_of(
             if asperities is not None:
                 scene = press_on(asperities)
             elif layout.pattern == "file":
-                columns = named_columns("columns", layout.columns, SUMMIT_COLUMNS)
-                manner = Reading(columns=columns, units=units.names, convert=units.convert)
+                names = named_columns("columns", layout.columns, SUMMIT_COLUMNS)
+                read = Reading(columns=names, units=units.names, convert=units.convert, keyed=True)
                 place = path.parent / layout.path
-                scene = press_on(summits(place, tip_radius=layout.tip_radius, how=manner))
+                scene = press_on(summits(place, tip_radius=layout.tip_radius, how=read))
             else:
                 own = layout.seed if seed is None else seed
                 scene, highest = _lattice(layout, own, study, press_on, lattice)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -63,6 +64,7 @@ class Reading:
     convert: bool = False  # True to convert columns in other units, False to refuse them
     scalable: bool = False  # True if messages may propose the options --scale and --column
     shared: Sequence[str] = ()  # columns also in another file, to which --scale would apply, too
+    keyed: bool = False  # True if messages may propose the key `columns` of [asperities]
     alike: bool = True  # True to demand one unit of a quantity, even if the scene names none
 
 
@@ -114,14 +116,27 @@ def places_of(
     return places, mistakes
 
 
-def lookalikes(unread: Sequence[str], missing: Sequence[str]) -> Iterator[str]:
-    """A mistake for each unread column whose name is similar to that of a missing one."""
+def columns_key(named: Mapping[str, str], missing: Iterable[str], unread: Iterable[str]) -> str:
+    """The key `columns` of a scene file: the headers in `named` by known name; and for each other
+    name in `missing` an unread column with the same initial, or the only one, or NAME."""
+    chosen = dict(named)
+    for name in (each for each in missing if each not in named):
+        left = [it for it in unread if it not in chosen.values() and "diam" not in it.lower()]
+        initials = tuple(each[0] for each in (name, *COLUMNS[name].also))
+        alike = [each for each in left if each.lower().startswith(initials)]
+        chosen[name] = (alike or (left if len(left) == 1 else ["NAME"]))[0]
+    pairs = (f"{key} = {json.dumps(each, ensure_ascii=False)}" for key, each in chosen.items())
+    return f"columns = {{{', '.join(pairs)}}} in [asperities]"
+
+
+def lookalikes(unread: Sequence[str], missing: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """Each name of a missing column, with that of an unread one that is similar."""
     from difflib import SequenceMatcher  # only when a column is missing
 
     for name, each in product(unread, missing):
         alike = SequenceMatcher(None, name.lower(), each).ratio()
         if LOOKS_LIKE < alike < 1:  # 1: assigned otherwise by `Reading.columns`
-            yield f'columns: found {name!r}, expected a known column; did you mean "{each}"?'
+            yield each, name
 
 
 def factors_of(

@@ -119,27 +119,37 @@ def read_table(
         places = {name: place for name, place in places.items() if name not in instead}
     missing = [name for name in required if name not in places]
     left = [bare(name) for i, name in enumerate(source.header or []) if i not in places.values()]
-    others = [quote(name) for name in left if not is_index(name)]
-    short = len(others) == 1 == len(missing) and len(others[0]) < 40
-    other = others[0] if short else "NAME" if source.header else "NUMBER"
+    others = [name for name in left if not is_index(name) and len(name) < 40]
+    other = (
+        quote(others[0])
+        if len(others) == 1 == len(missing)
+        else "NAME"
+        if source.header
+        else "NUMBER"
+    )
     pixels = instead and {"x", "y"} <= places.keys()
     arrays = path.suffix.lower() in ARRAYS
     naming = "save vectors with these names" if arrays else "add a first row with names"
     advice = ": rename one" if source.header else f": {naming}"
     advice = "" if how.scalable else advice
+    measured = (name for name in optional if COLUMNS[name].kind and name not in places)
+    similar = [*roles.lookalikes(left, [*missing, *measured])]
+    key = roles.columns_key({**how.columns, **dict(similar)}, missing, others)
+    key = f", or {key}" if how.keyed and source.header else ""
     if instead and source.header is None and len(source.columns) > MOST_NUMBERED:
         kind = "arrays of an .npz file" if arrays else "columns"
         advice = f"; a map of pressures also needs coordinates: x, y and pressure as {kind}"
     mistakes += [
         f"columns: found {source.named()}, expected a column {each!r}"
         + advice
+        + key
         + (f"; --column {each}={other} names another" if how.scalable else "")
         + (f", --column {instead[0]}={other} that of pixels" if how.scalable and pixels else "")
         for each in missing
         if each not in how.columns
     ]
-    measured = (name for name in optional if COLUMNS[name].kind and name not in places)
-    mistakes += roles.lookalikes(left, [*missing, *measured])
+    slip = 'columns: found {!r}, expected a known column; did you mean "{}"{}?'
+    mistakes += [slip.format(name, each, key) for each, name in similar]
     if not source.rows and not mistakes and not source.mistakes:
         mistakes = ["rows: found none below the header, expected at least one"]
     if missing or not source.rows:

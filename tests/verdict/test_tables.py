@@ -271,13 +271,25 @@ def test_summits_without_a_header(tmp_path: Path) -> None:
     assert read_summits(path, tip_radius=1.0, how=how).positions.tolist() == [[0, 0.5], [1, 2]]
 
 
+KEYED = Reading(keyed=True)  # as for the file of a scene
+
+
 @pytest.mark.sample(8)
 @pytest.mark.parametrize(
     ("content", "expected"),
     [
         ("", "empty"),
         ("x,y\n", "rows: found none below the header"),
-        ("x,y,heigth\n0,0,0\n", "found 'heigth', expected a known column; did you mean \"height\""),
+        (
+            "x,y,heigth\n0,0,0\n",
+            "found 'heigth', expected a known column; did you mean \"height\", "
+            'or columns = {height = "heigth"} in [asperities]?',
+        ),
+        (
+            "X-Koord. [m],Y-Koord. [m],z,R\n0,0,0,1\n",
+            "expected a column 'x': rename one, or columns = "
+            '{x = "X-Koord.", y = "Y-Koord."} in [asperities]',
+        ),
         ("x,height\n0,0\n", "columns: found x, height, expected a column 'y'"),
         ("x,y,x\n0,0,0\n", "columns: found 'x' twice, expected once"),
         ("x,y\n0,0\n1,2,3\n", "row 3: found 3 cells, expected 2, as in the header: 1,2,3"),
@@ -303,7 +315,7 @@ def test_summits_without_a_header(tmp_path: Path) -> None:
 def test_wrong_summits(tmp_path: Path, content: str, expected: str) -> None:
     path = tmp_path / put(tmp_path, content)
     with pytest.raises(cr.ConvexroughError) as caught:
-        read_summits(path, tip_radius=None if "neither" in expected else 1.0)
+        read_summits(path, tip_radius=None if "neither" in expected else 1.0, how=KEYED)
     assert str(caught.value).startswith(str(path))
     assert expected in str(caught.value)
 
