@@ -9,6 +9,9 @@ from typing import Any
 
 LOGGER = logging.getLogger("convexrough")
 
+#: The level, between INFO and WARNING, of records that commands print and keep.
+NOTE = 25
+
 
 def log_step(solver: str, step: int, objective: float, residual: float) -> None:
     """Log a step of an iteration at level DEBUG; `args` of the record has the four values."""

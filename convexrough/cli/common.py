@@ -171,13 +171,14 @@ def say_aside(*parts: str) -> None:
 def progress(message: str) -> Iterator[None]:
     """Show a line on a terminal, with records of our logger, while the body of `with` runs.
 
-    What the body prints, such as a user's solver, goes to standard error.
+    What the body prints, such as a user's solver, and records of level NOTE go to standard error.
     """
+    from convexrough.progress import NOTE, logged
+
     with redirect_stdout(sys.stderr), ExitStack() as stack:
+        stack.enter_context(logged(lambda record: say_aside("note", record.getMessage()), NOTE))
         if sys.stderr.isatty():
             from rich.console import Console
-
-            from convexrough.progress import logged
 
             line = stack.enter_context(Console(stderr=True).status(message))
             told = logged(lambda record: line.update(f"{message}: {record.getMessage()}"))

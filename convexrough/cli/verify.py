@@ -150,7 +150,8 @@ def verify(
     with ExitStack() as stack:
         names = " ".join(map(str, filter(None, (scene, loads, shear))))
         stack.enter_context(_reported(junit, names))
-        file = read_scene(scene)
+        with common.progress(f"reading {scene}"):
+            file = read_scene(scene)
         shared = ("x", "y") if shear is not None else ()
         manner = _manner(units=file.scene.units, convert=file.convert, shared=shared, **how)
         read = [read_loads(loads, file.scene, manner)]

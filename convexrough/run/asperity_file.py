@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from convexrough.arrays import Array
 from convexrough.errors import InputError, blamed_on
+from convexrough.progress import LOGGER, NOTE
 from convexrough.scene.asperities import Asperities
-from convexrough.tabular.roles import AS_IT_IS, Reading, is_index, shortened
+from convexrough.tabular.roles import AS_IT_IS, Reading, columns_key, is_index, shortened
 from convexrough.tabular.table import read_table
 from convexrough.tabular.units import bare, parsed
 
@@ -41,12 +42,12 @@ def read_summits(
         if cells.dtype.kind == "f"
         and not (name.isdecimal() or is_index(name) or bare(name).lower() in RESULTS)
     ]
+    some = ", ".join(unread[:MOST_NAMED]) + ", ..." * (len(unread) > MOST_NAMED)
     if "height" not in columns and unread:  # one of them may contain heights
-        some, more = ", ".join(unread[:MOST_NAMED]), ", ..." if len(unread) > MOST_NAMED else ""
-        named = f'columns = {{height = "{unread[0]}"}} in [asperities], or no such column'
+        named = f"{columns_key(how.columns, ['height'], unread)}, or no such column"
         if "depth" in unread[0].lower():
             named = "which grows towards the sphere: write depths as negative heights"
-        raise InputError("columns", found=f"{some}{more}, but no height",
+        raise InputError("columns", found=f"{some}, but no height",
                          expected=f"a column height; {named}", where=str(path))  # fmt: skip
     for name, said in table.units.items():
         if parsed(said) and not how.units.length:
@@ -65,10 +66,18 @@ def read_summits(
     if (given is None) == (tip_radius is None):
         found = "neither" if given is None else "both"
         expected = "either a column tip_radius or the key tip_radius in the scene file"
+        if given is None and unread:
+            key = columns_key(how.columns, ["tip_radius"], unread)
+            expected += f"; not used: {some}; {key} names radii (half of diameters)"
         raise InputError("tip radii", found=found, expected=expected, where=str(path))
     positions = np.column_stack((columns["x"], columns["y"]))
     radii = tip_radius if given is None else given
     assert radii is not None  # one of the two is given
+    notes = [table.style] if '" of ' in table.style else []  # one of several sheets
+    if unread and "elliptic_load" not in unread:  # a column of summits.csv
+        notes.append(f"not used: {some}")
+    if notes:
+        LOGGER.log(NOTE, f"{path}: {', '.join(notes)}")
     with blamed_on(f"{path} ({table.rows[0]} holds asperity 0)"):
         return Asperities(positions, radii, columns.get("height", 0.0))
 

@@ -334,8 +334,8 @@ def _lines(path: Path) -> Iterator[tuple[int, str]]:
 def _sheet_lines(
     path: Path, known: Sequence[str], required: Sequence[str], is_map: bool
 ) -> tuple[str, Iterator[tuple[int, str]], list[str]]:
-    """The sheet that `read_text_table` reads: its name and those of others that fit equally well,
-    in quotes; its numbered rows, separated by tabs; and, for a map, the rows of other sheets."""
+    """The sheet that `read_text_table` reads: its name, the number of sheets, and others that
+    fit equally well; its numbered rows, separated by tabs; and, for a map, rows of other sheets."""
     openpyxl = needed("openpyxl")
     with path.open("rb") as raw, foreign():
         book = openpyxl.load_workbook(raw, read_only=True, data_only=True)
@@ -364,7 +364,8 @@ def _sheet_lines(
             raise FileError(f"{path}: found {found}, expected {expected}")
         aside = [" ".join(row) for name in pages if name != best for row in pages[name]]
     also = " or ".join(f'"{name}"' for name in others)
-    name = f'"{best}"' + (f", not {also}" if also else "")
+    count = f" of {len(pages)}" * (len(pages) > 1)
+    name = f'"{best}"{count}' + (f", not {also}" if also else "")
     return name, enumerate(map("\t".join, pages[best]), 1), aside
 
 

@@ -156,7 +156,7 @@ def test_the_only_sheet_with_a_map(tmp_path: Path) -> None:
         for sheets, name in (([INFORMATION, sheet], "Sheet1"), ([sheet, INFORMATION], "Sheet")):
             surface = raw(path, sheets, pixel=1.0)
             assert_allclose(surface.heights, HEIGHTS)
-            assert surface.source == f'{path}, sheet "{name}"'
+            assert surface.source == f'{path}, sheet "{name}" of 2'
         with pytest.raises(cr.FileError, match=f"found maps {both}"):
             raw(path, [sheet, (HEIGHTS > 0).tolist()], pixel=1.0)
         with pytest.raises(cr.InputError, match="comments: found Pixel 0"):

@@ -331,7 +331,7 @@ REFUSED: dict[str, tuple[Any, ...]] = {
         "a.mat: found A, B, expected vectors by name, or only one matrix or structure\n"),
     "the wrong sheet": (
         lambda case: [[["load", "E"], [3.0, 70e9]], cells(case.table())], "a.xlsx",
-        'rows: found 1 in sheet "Sheet", not "Sheet1", expected 12, one per'),
+        'rows: found 1 in sheet "Sheet" of 2, not "Sheet1", expected 12, one per'),
     "a sign with noise": (
         lambda case: {"load": np.where(case.loads > 0, -case.loads, 1e-9 * case.loads.max())}, "",
         "and the least is -", "expected positive compression: --sign -1 and --floor "),

@@ -299,6 +299,11 @@ KEYED = Reading(keyed=True)  # as for the file of a scene
         ("x,y,elevation,load,id\n0,0,1,2,3\n", "columns: found elevation, but no height, expect"),
         ("x,y,depth\n0,0,1\n", "sphere: write depths as negative heights"),
         ("x,y\n0,0\n", "tip radii: found neither"),
+        (
+            "x,y,z,diameter,R\n0,0,0,2,1\n",
+            "found neither, expected either a column tip_radius or the key tip_radius in the scene "
+            'file; not used: diameter, R; columns = {tip_radius = "R"} in [asperities]',
+        ),
         ("x,y\n0,0\n0,0\n", "asperities 0 and 1"),
         *(
             (f"x,y,{each}\n0,0,1\n", "column height: found mm, and a scene without units, expected")
@@ -323,6 +328,15 @@ def test_wrong_summits(tmp_path: Path, content: str, expected: str) -> None:
 def test_the_sheet_of_a_workbook_is_named(tmp_path: Path) -> None:
     pages = [[["notes"]], cells({"x": [0, 1, 0.5], "y": [0, 0, 2.5], "load": LOADS})]
     note = read(tmp_path, pages, "loads.xlsx").note
-    assert 'loads.xlsx: sheet "Sheet1", matched by position' in note
+    assert 'loads.xlsx: sheet "Sheet1" of 2, matched by position' in note
     note = read(tmp_path, [*pages, [["load"]]], "loads.xlsx").note
-    assert 'loads.xlsx: sheet "Sheet1", not "Sheet2", matched by position' in note
+    assert 'loads.xlsx: sheet "Sheet1" of 3, not "Sheet2", matched by position' in note
+
+
+def test_a_run_names_what_it_does_not_use(command: Any, tmp_path: Path) -> None:
+    table = [["x", "y", "z", "R", "load", "label"], [0, 0, 0, 1, 2, "a"]]
+    put(tmp_path, [[["notes"]], table], "a.xlsx")
+    summits = 'pattern = "file"\npath = "a.xlsx"\ntip_radius = 0.1'
+    (tmp_path / "scene.toml").write_text(scene_text(summits))
+    said = 'convexrough: note: a.xlsx: sheet "Sheet1" of 2, not used: R\n'
+    assert command("run", "scene.toml", "--no-figures").err.startswith(said)
