@@ -103,7 +103,7 @@ def root(levels: FrictionLevels, place: int) -> Fraction:
 
     if not levels.at(Fraction(0)).open[place]:  # it may be the asperity that touches first of all
         return Fraction(0)
-    high = min(load for load in levels.known if depth(load) > 0)
+    high = min((load for load in levels.known if depth(load) > 0), default=levels.load)
     low = max((load for load in levels.known if depth(load) <= 0), default=Fraction(0))
     here = min((low, high), key=lambda s: abs(depth(s))) if low else high
     for _ in range(STEPS):
