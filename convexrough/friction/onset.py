@@ -63,6 +63,8 @@ def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Arr
     asked = indices("which", which, len(contact.scene))
     levels = contact.cached(FrictionLevels)
     onsets, loaded = np.full(len(asked), np.nan), np.flatnonzero(levels.loads[asked])
+    if not levels.proved:
+        return frozen(onsets)
     if not levels.top.problem.influence.stored and len(loaded) > MOST_ONSETS:
         expected = f"at most {MOST_ONSETS}: for each, several normal problems are solved"
         raise InputError("which", found=f"{len(loaded):,} loaded asperities", expected=expected)
@@ -103,7 +105,7 @@ def root(levels: FrictionLevels, place: int) -> Fraction:
 
     if not levels.at(Fraction(0)).open[place]:  # it may be the asperity that touches first of all
         return Fraction(0)
-    high = min((load for load in levels.known if depth(load) > 0), default=levels.load)
+    high = min(load for load in levels.known if depth(load) > 0)
     low = max((load for load in levels.known if depth(load) <= 0), default=Fraction(0))
     here = min((low, high), key=lambda s: abs(depth(s))) if low else high
     for _ in range(STEPS):
