@@ -63,7 +63,7 @@ def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Arr
     asked = indices("which", which, len(contact.scene))
     levels = contact.cached(FrictionLevels)
     onsets, loaded = np.full(len(asked), np.nan), np.flatnonzero(levels.loads[asked])
-    if not levels.proved:
+    if not levels.top.touching.any():  # nothing is proved
         return frozen(onsets)
     if not levels.top.problem.influence.stored and len(loaded) > MOST_ONSETS:
         expected = f"at most {MOST_ONSETS}: for each, several normal problems are solved"
@@ -105,7 +105,7 @@ def root(levels: FrictionLevels, place: int) -> Fraction:
 
     if not levels.at(Fraction(0)).open[place]:  # it may be the asperity that touches first of all
         return Fraction(0)
-    high = min(load for load in levels.known if depth(load) > 0)
+    high = min((load for load in levels.known if depth(load) > 0), default=levels.load)
     low = max((load for load in levels.known if depth(load) <= 0), default=Fraction(0))
     here = min((low, high), key=lambda s: abs(depth(s))) if low else high
     for _ in range(STEPS):

@@ -245,8 +245,10 @@ class Level:
             beta = Ball.exact(mean) + float(weights @ (above - mean).value)
             return above - beta, beta
 
+        sprung = c > 0
+
         def weighted(values: Array) -> float:  # errors may be infinite where c is 0
-            return float(np.sqrt((c * values**2)[c > 0].sum()))
+            return float(np.sqrt((c[sprung] * values[sprung] ** 2).sum()))
 
         nothing, sharp, halved = Pair.exact(np.zeros(len(c))), False, True
         x = completed(Pair.exact(float(total.value) * weights))
