@@ -61,11 +61,10 @@ class FrictionLevels:
         """True if the normal solution at P is proved."""
         return self.top.box is not None
 
-    @cached_property
+    @property
     def loads(self) -> Array:
-        """(N,) [force] the loads at P of the solution, to which errors of `contact.loads` do not
-        contribute; 0 where an asperity is open."""
-        return self.to_scene(self.top.loads.value) * self.units.force
+        """(N,) [force] the loads at P of the solution: `Levels.loads`."""
+        return self._levels.loads
 
     @property
     def presses(self) -> int:

@@ -17,7 +17,6 @@ from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact, turned
 from convexrough.errors import InputError
-from convexrough.friction.levels import FrictionLevels
 from convexrough.friction.shear import ShearState
 from convexrough.gradients.gradient import control_held, levels
 from convexrough.gradients.parts import ZERO, Bending, Geometry, Part, product
@@ -160,7 +159,7 @@ def _pressed(
 
 def _gap_changes(contact: Contact, bent: _Bent, loads: Array, approach: float) -> Array:
     """(n,) [length] dA P + A dP - dd - dD0, the changes of open gaps, in float64; 0 elsewhere."""
-    scene, pressed = contact.scene, contact.cached(FrictionLevels).loads
+    scene, pressed = contact.scene, levels(contact).loads
     open_ones = pressed == 0.0
     if not open_ones.any():
         return np.zeros(len(scene))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,6 +57,12 @@ class Levels:
     def __init__(self, top: Level, press: Press, *, together: bool = False) -> None:
         self.top, self.problem, self._press, self._together = top, top.problem, press, together
         self._known: dict[tuple[float, float, float], Level] = {}
+
+    @cached_property
+    def loads(self) -> Array:
+        """(N,) [force] the loads of the solution at `top`, 0 where open. Errors of the loads that a
+        solver found, such as small loads on open asperities, do not enter."""
+        return self.problem.to_scene(self.top.loads.value * self.problem.units.force)
 
     @property
     def presses(self) -> int:

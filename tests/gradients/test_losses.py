@@ -208,3 +208,5 @@ def test_both_prescriptions_are_held_unless_told_otherwise() -> None:
     assert abs(by_load.change(raised).load) < 1e-12 * by_approach.change(raised).load
     same = by_load.change(replace(raised, approach=0.0))
     np.testing.assert_allclose(same.loads, by_approach.change(raised).loads, rtol=1e-10, atol=1e-25)
+    alone = cr.press(replace(by_approach.scene, friction=None), approach=by_approach.approach)
+    np.testing.assert_array_equal(alone.change(raised).gaps, by_approach.change(raised).gaps)
