@@ -117,8 +117,11 @@ def read(
         unclear = next(filter(states_scale, grid.comments), "")
         if unclear and not ((pixel or grid.pixel) and (height_unit or grid.height_unit)):
             expected = '"Width: 50 µm", "Height: 50 µm" and "Value units: nm" above a matrix, '
-            expected += '"x [µm] y [µm] z [nm]" above columns, or all three options'
-            expected += " --pixel, --unit, --height-unit, if the file is right without this line"
+            expected += '"x [µm] y [µm] z [nm]" above columns'
+            options = {"--pixel": pixel or grid.pixel, "--unit": unit or grid.unit}
+            options["--height-unit"] = height_unit or grid.height_unit
+            missing = " and ".join(name for name, known in options.items() if not known)
+            expected += f", or also {missing} if the file is right without this line"
             raise InputError("comments", found=unclear.strip(), expected=expected)
         length = one_unit("unit", unit, grid.unit)
         upwards = one_unit("height_unit", height_unit, grid.height_unit)

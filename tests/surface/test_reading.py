@@ -237,7 +237,7 @@ WRONG: list[tuple[str, dict[str, Any], str]] = [
     ("# Height: 7 µm\n@", ONE | {"unit": "mm"}, "comments: found only a hei"),
     ("# Width: 9 m\n# Height: 7 m\n@", {"pixel": 2.0}, "found 2 by 2, expected 1 by"),
     ("@" + matrix([HEIGHTS.mean(axis=0).round(3)]), ONE, "last row: found the means of"),
-    ("# z unit: nm\n@", ONE | {"unit": "mm"}, "comments: found # z unit"),
+    ("# z unit: nm\n@", ONE | {"unit": "mm"}, "comments: found # z unit.*, or also --height-unit"),
     ("# Value units: V\n@", ONE | {"unit": "m"}, "height_unit: found 'V'"),
     (2 * "# Width: 9 m\n# Height: 7 m\n@", {}, "rows: found lines without numbers"),
     ("@\n@", ONE, "without numbers between rows 7 and 9, expected one map"),
