@@ -305,6 +305,7 @@ def test_a_solver_of_ones_own_by_its_name(command: Any, tmp_path: Path, monkeypa
     assert "expected real numbers" in words.out
     profiled = command("gallery", "--profile", "few", "--solver", "desk_solvers.Mine", "--json")
     assert [each["solver"] for each in json.loads(profiled.out)["profile"]] == ["newton", "mine"]
+    assert profiled.status == 0
     mine = json.loads(profiled.out)["profile"][1]
     assert mine["right"] == mine["contact set right"] == len(mine["outcomes"]) > 0
     both = [x for name in ("Ones", "Refined") for x in ("--solver", f"desk_solvers.{name}")]
@@ -314,6 +315,8 @@ def test_a_solver_of_ones_own_by_its_name(command: Any, tmp_path: Path, monkeypa
     ran = command("compare", "scene.toml", *both, "--json")
     assert ran.status == 3
     assert [each["solver"] for each in json.loads(ran.out)["compare"]] == names
-    profile = json.loads(command("gallery", "--profile", "few", *both, "--json").out)["profile"]
+    profiled = command("gallery", "--profile", "few", *both, "--json")
+    assert profiled.status == 3
+    profile = json.loads(profiled.out)["profile"]
     assert [each["solver"] for each in profile] == names
     assert [bool(each["right"]) for each in profile] == [True, False, True]

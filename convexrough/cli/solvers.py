@@ -133,7 +133,7 @@ def gallery(
     an earlier export. --profile prints how many solutions of each solver are right, and its times;
     --solver limits it to Newton's method and the named solvers. Loads are right if all errors are
     at most 0.1 % of the largest load. The contact set is right if exactly the asperities that touch
-    have a load.
+    have a load. With --solver the exit status is 4 if a solver failed, else 3 if loads are wrong.
     """
     from convexrough import gallery as wing
     from convexrough.compare import solver_named
@@ -155,7 +155,10 @@ def gallery(
             for row, each in zip(table, found.outcomes, strict=True)
         ]
         output.say({"profile": reported}, aligned([list(table[0]), *cells], left=1))
-        return common.DONE
+        if solvers and (found.outcomes == "failed").any():
+            return common.SOLVER_FAILED
+        wrong = solvers and (found.outcomes == "wrong").any()
+        return common.NOT_CERTIFIED if wrong else common.DONE
     cases = [wing.case(name) for name in wanted]
     lines = []
     if show_list or export is None:
