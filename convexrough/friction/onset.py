@@ -45,8 +45,9 @@ def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Arr
 
     It is f (P - the load of the first touch): docs/theory/states.md, "First loading". In a steady
     cycle at constant load, the asperity slides if the amplitude of the shear force exceeds it. The
-    result is nan for an asperity without load, and if order (docs/theory/states.md) "fails" between
-    its first touch and the load of the contact: it may then start to slide at another force.
+    result is nan for an asperity without load, where nothing is proved about the first touch, and
+    if order (docs/theory/states.md) "fails" between it and the load of the contact: the asperity
+    may then start to slide at another force.
 
     which : indices of asperities, in the order of the result; default: all. Several normal problems
         are solved for each
@@ -72,8 +73,9 @@ def onset_of_sliding(contact: Contact, *, which: ArrayLike | None = None) -> Arr
     lowest = min((each.load for each in found.values()), default=levels.load)
     ordered = levels.order([lowest]) != "fails"
     for k in loaded.tolist():
-        load = found[int(asked[k])].load
-        if ordered or levels.order([load]) != "fails":
+        load, lower, upper = found[int(asked[k])]
+        nothing = lower == 0 and upper == levels.load  # is proved
+        if not nothing and (ordered or levels.order([load]) != "fails"):
             onsets[k] = float(f * (levels.load - load))
     return frozen(onsets)
 
@@ -91,7 +93,8 @@ def _enclosed(levels: FrictionLevels, asperity: int) -> Onset:
     around = [Fraction(part) * (found or levels.load) for part in TRIED]
     near = [s for s in levels.known if around[0] <= abs(s - found) <= around[ENOUGH]]
     below = [*(s for s in near if s < found), *(found - part for part in around)]
-    above = [*(s for s in near if s > found), *(found + part for part in around)]
+    farther = (found + Fraction(part) * levels.load for part in TRIED)  # if `found` is tiny
+    above = [*(s for s in near if s > found), *(found + part for part in around), *farther]
     lower = next((s for s in below if levels.has(s) and levels.at(s).open[place]), Fraction(0))
     sure = (s for s in above if s < levels.load and levels.has(s) and levels.at(s).touching[place])
     return Onset(found, lower, next(sure, levels.load))

@@ -103,7 +103,8 @@ class ScatteredInfluence(coupling.Influence):
         if len(points) * len(self) <= FEW_PAIRS:
             return super().onto(points)
         together = np.concatenate((points, self.points))
-        return coupling.JointCoupling(replace(self, points=together, tails=None), len(points))
+        joint = replace(self, points=together, tails=None, whole=None)
+        return coupling.JointCoupling(joint, len(points))
 
     def slopes(self, loads: Array) -> Ball:
         if self._double is None:

@@ -44,11 +44,11 @@ def read_summits(
     ]
     some = ", ".join(unread[:MOST_NAMED]) + ", ..." * (len(unread) > MOST_NAMED)
     if "height" not in columns and unread:  # one of them may contain heights
-        named = f"{columns_key(how.columns, ['height'], unread)}, or no such column"
+        named = f"; {columns_key(how.columns, ['height'], unread)}, or no such column"
         if "depth" in unread[0].lower():
-            named = "which grows towards the sphere: write depths as negative heights"
+            named = ", which grows towards the sphere: write depths as negative heights"
         raise InputError("columns", found=f"{some}, but no height",
-                         expected=f"a column height; {named}", where=str(path))  # fmt: skip
+                         expected=f"a column height{named}", where=str(path))  # fmt: skip
     for name, said in table.units.items():
         if parsed(said) and not how.units.length:
             expected = f'[units] length in the scene file, as "{said}"'

@@ -71,7 +71,9 @@ class Task(Record):
 
     def cautions(self, contact: Contact) -> Iterator[str]:
         """Yield warnings about stages that do not fit the contact, before they are computed."""
-        return (each for stage in self.stages.values() for each in stage.cautions(contact))
+        from convexrough.run.stage import cautions  # which imports what draws
+
+        return cautions(self.stages.values(), contact)
 
     def compute(self, contact: Contact) -> list[Result]:
         """The results of all stages, in the order of `stages`; the first is that of [normal].

@@ -7,6 +7,7 @@ result.
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -60,6 +61,27 @@ FAR, SLIGHT = 100.0, 2e-3
 MOST_PRINTED = 20
 
 
+def cautions(stages: Iterable[Stage], contact: Contact) -> Iterator[str]:
+    """Warnings about stages that do not fit the contact, and about the model at their largest load,
+    if this is larger than the load of the contact, of kinds that do not concern the contact."""
+    stages = list(stages)
+    for stage in stages:
+        yield from stage.cautions(contact)
+    highest = max(stages, key=lambda stage: stage.highest_load, default=None)
+    if highest is not None and highest.highest_load > contact.load:
+        with suppress(ConvexroughError):  # `compute` raises it
+            top = press(contact.scene, load=highest.highest_load, influence=contact.influence)
+            said = {_kind(each) for each in cautions_of(contact)}
+            for each in cautions_of(top):
+                if _kind(each) not in said:
+                    yield f"under the largest load of [{highest.name}]: {each}"
+
+
+def _kind(warning: str) -> str:
+    """The warning without its numbers."""
+    return re.sub(r"[\d.,]+(e[-+]?\d+)?", "", warning)
+
+
 class Stage(FileTable):
     """A table of the scene file with checked keys, which requests a result of a pressed contact.
 
@@ -86,12 +108,11 @@ class Stage(FileTable):
         return 0.0
 
     def cautions(self, contact: Contact) -> Iterator[str]:
-        """Warnings about loads and shear forces that are implausible for the pressed contact, or
-        at the largest load, if that is larger than the load of the contact."""
+        """Warnings about loads and shear forces that are implausible for the pressed contact."""
         load, name, known = self.highest_load, f"[{self.name}]", contact.load
         if not load:
             return
-        if far := known and not 1 / FAR <= load / known <= FAR:
+        if known and not 1 / FAR <= load / known <= FAR:
             yield (
                 f"{name} has loads up to {load:.4g}, and [normal] has the load {known:.4g}: check "
                 f"the units in both tables, and the key `reference` of {name}"
@@ -101,13 +122,6 @@ class Stage(FileTable):
                 f"{name} has shear forces up to {self.highest_force:.4g}, less than {SLIGHT:g} of "
                 "the friction limit at the largest load: check the units of the forces"
             )
-        if load > known and not far:
-            with suppress(ConvexroughError):  # `compute` raises it
-                top = press(contact.scene, load=load, influence=contact.influence)
-                said = {*cautions_of(contact)}
-                for each in cautions_of(top):
-                    if each not in said:
-                        yield f"under the largest load of {name}: {each}"
 
     @classmethod
     def sheared_by(cls, keys: Any) -> str:

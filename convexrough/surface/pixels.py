@@ -119,17 +119,20 @@ def _crossings(
 def spikes(heights: Array) -> Indices:
     """(m, 2) row and column of outlying pixels of which at most one neighbour differs from them by
     less than half of their difference from the median; and of pixels at which the second difference
-    is outlying, and ALONE times as large as at other pixels nearby. Holes (nan) are neither."""
-    bent = np.nan_to_num(np.abs(ndimage.laplace(heights, mode="mirror")))
-    others = ndimage.maximum_filter(bent, footprint=AROUND, mode="constant")
-    alone = (bent > OUTLYING * np.sqrt(np.mean(bent**2))) & (bent > ALONE * others)
+    is outlying, and ALONE times as large as at other pixels nearby. Holes (nan) are neither, and
+    single steps of quantised heights are no spikes."""
+    bent = np.abs(ndimage.laplace(heights, mode="mirror"))
+    unknown = np.where(np.isnan(bent), np.inf, bent)
+    others = ndimage.maximum_filter(unknown, footprint=AROUND, mode="constant")
+    least = max(OUTLYING * np.sqrt(np.nanmean(bent**2)), 6.0 * step(heights[~np.isnan(heights)]))
+    alone = (bent > least) & (bent > ALONE * others)
     low, middle, high = np.nanquantile(heights, (0.25, 0.5, 0.75))
     away = np.abs(heights - middle)
     found = np.argwhere(away > OUTLYING * (high - low) / 1.349)
     padded = np.pad(heights, 1, mode="reflect")
     alike = np.zeros(len(found), dtype=int)
-    for step in np.ndindex(3, 3):
-        apart = np.abs(padded[tuple((found + step).T)] - heights[tuple(found.T)])
+    for shift in np.ndindex(3, 3):
+        apart = np.abs(padded[tuple((found + shift).T)] - heights[tuple(found.T)])
         alike += apart < away[tuple(found.T)] / 2  # this also counts the pixel itself
     alone[tuple(found[alike <= 2].T)] = True
     return np.argwhere(alone)

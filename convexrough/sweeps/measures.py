@@ -20,12 +20,13 @@ from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.contact import Contact
 from convexrough.errors import ConvexroughError, InputError
+from convexrough.friction.levels import FrictionLevels
 from convexrough.friction.onset import onset_of_sliding
 from convexrough.plausibility import cautions_about, cautions_of
 from convexrough.record import singular
 from convexrough.rows import PressedRows, in_rows
 from convexrough.run.scene_file import Task
-from convexrough.run.stage import STATUSES, Stage, limit, unit_of
+from convexrough.run.stage import STATUSES, Stage, cautions, limit, unit_of
 from convexrough.run.stages import CycleStage
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz, mindlin
@@ -69,21 +70,20 @@ def measured(contact: Contact, stages: Stages, wanted: Container[str]) -> Measur
     """The numbers of the stages in `wanted`, and of the stage "normal"."""
     found: Numbers = {}
     doubts: list[str] = []
-    cautions = [*cautions_of(contact)]
-    for name, stage in stages.items():
-        if name in wanted or name == "normal":
-            cautions += stage.cautions(contact)
-            result = stage.compute(contact)
-            found |= _numbers(result.summary(), name, "", [*stage.labels])
-            doubts += result.doubts()
+    chosen = {name: it for name, it in stages.items() if name in wanted or name == "normal"}
+    said = [*cautions_of(contact), *cautions(chosen.values(), contact)]
+    for name, stage in chosen.items():
+        result = stage.compute(contact)
+        found |= _numbers(result.summary(), name, "", [*stage.labels])
+        doubts += result.doubts()
     if ONSET in wanted:
-        which = np.flatnonzero(contact.loads)
+        which = np.flatnonzero(contact.cached(FrictionLevels).loads)
         onsets = onset_of_sliding(contact, which=which) / (limit(contact) or 1.0)
         at = np.full(len(QUANTILES), np.nan)
         if len(which):  # the least force at which this part slides
             at = np.quantile(onsets, QUANTILES, method="inverted_cdf")
         found |= {(ONSET, f"{q:g}"): float(it) for q, it in zip(QUANTILES, at, strict=True)}
-    return Measured(found, "; ".join(doubts), "; ".join(cautions))
+    return Measured(found, "; ".join(doubts), "; ".join(said))
 
 
 def _numbers(

@@ -40,12 +40,12 @@ COLUMNS = {
 
 #: Names of columns with row numbers.
 INDEX = ("index", "id", "no", "nr", "#", "i", "number", "node", "label", "node label", "asperity",
-         "")  # fmt: skip
+         "row", "")  # fmt: skip
 
 
 def is_index(header: str) -> bool:
     """True for the header of a column with row numbers."""
-    return bare(header).lower() in INDEX
+    return bare(header).lower().removesuffix(".") in INDEX
 
 
 #: Largest number of characters of a line that are shown; similarity above which the name of an
@@ -118,13 +118,13 @@ def places_of(
 
 def columns_key(named: Mapping[str, str], missing: Iterable[str], unread: Iterable[str]) -> str:
     """The key `columns` of a scene file: the headers in `named` by known name; and for each other
-    name in `missing` an unread column with the same initial, or the only one, or NAME."""
+    name in `missing` an unread column with the initial of its last word or a synonym, or NAME."""
     chosen = dict(named)
     for name in (each for each in missing if each not in named):
         left = [it for it in unread if it not in chosen.values() and "diam" not in it.lower()]
-        initials = tuple(each[0] for each in (name, *COLUMNS[name].also))
+        initials = tuple(each.split("_")[-1][0] for each in (name, *COLUMNS[name].also))
         alike = [each for each in left if each.lower().startswith(initials)]
-        chosen[name] = (alike or (left if len(left) == 1 else ["NAME"]))[0]
+        chosen[name] = (alike or ["NAME"])[0]
     pairs = (f"{key} = {json.dumps(each, ensure_ascii=False)}" for key, each in chosen.items())
     return f"columns = {{{', '.join(pairs)}}} in [asperities]"
 

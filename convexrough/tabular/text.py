@@ -10,7 +10,7 @@ from __future__ import annotations
 import csv
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 from contextlib import suppress
 from functools import partial
 from gzip import GzipFile
@@ -24,7 +24,7 @@ import numpy as np
 from convexrough.arrays import Array
 from convexrough.errors import FileError, InputError, needed
 from convexrough.tabular.arrays import foreign
-from convexrough.tabular.roles import shortened
+from convexrough.tabular.roles import is_index, shortened
 from convexrough.tabular.units import bare, parsed, unit
 
 #: Largest number of characters of a line, and of a number.
@@ -207,10 +207,12 @@ def read_text_table(
     if not rows:
         raise FileError(f"{path}: empty")
     above, (header, rows) = rows, _headed(rows, titles, style, known, is_map)
-    if header and not is_map and (also := _also_heading(header, above, style, known)):
-        found = f"rows {min(header.number, also)} and {max(header.number, also)}: found a heading"
+    found = {bare(cell).lower() for cell in header.cells} if header else set()
+    wanted = {it for it in known if not is_index(it)} if {*required} <= found else None
+    if header and not is_map and (also := _also_heading(header, above, style, wanted)):
+        both = f"rows {min(header.number, also)} and {max(header.number, also)}"
         expected = "the names of all columns in one row: unmerge cells and delete the other row"
-        raise FileError(f"{path}: {found} over two rows, expected {expected}")
+        raise FileError(f"{path}: {both}: found a heading over two rows, expected {expected}")
     top = header.number if header and header.number else rows[0].number
     comments += [row.text for row in above if row.number < top]
     if header:
@@ -273,17 +275,19 @@ def _headed(
     return line._replace(cells=names), rows
 
 
-def _also_heading(header: TextRow, rows: list[TextRow], style: Style, known: Sequence[str]) -> int:
+def _also_heading(
+    header: TextRow, rows: list[TextRow], style: Style, wanted: Container[str] | None
+) -> int:
     """The number of a row above or below the header that names columns which the header does not
-    name, as under merged cells of a sheet; 0 if there is none."""
+    name, as under merged cells of a sheet; 0 if there is none. If names are `wanted`, others do not
+    count: they may be titles."""
     for row in rows[: SAMPLE + 1] if style.separator != " " else ():
         if abs(row.number - header.number) != 1 or _are_units(row.cells):
             continue
         columns = zip_longest(header.cells, row.cells, rows[-1].cells, fillvalue="")
         names = [cell for name, cell, last in columns if cell and last and not name]
-        sure = row.number > header.number or len(names) > 1  # one may be a title, above an index
-        sure = sure or any(bare(name).lower() in known for name in names)
-        if names and sure and all(style.number(cell) is None for cell in row.cells):
+        names = [it for it in names if wanted is None or bare(it).lower() in wanted]
+        if names and all(style.number(cell) is None for cell in row.cells):
             return row.number
     return 0
 

@@ -26,7 +26,7 @@ from convexrough.arrays import Array
 from convexrough.bench.scenes import APPROACH
 from convexrough.bench.scenes import scene as bench_scene
 from convexrough.convex.newton_step import correct
-from convexrough.influence import couple, coupling, lattice
+from convexrough.influence import couple, coupling, lattice, scattered
 from convexrough.influence.coupling import Coupling, Influence, JointCoupling, inverse_distances
 from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.lattice import LatticeInfluence
@@ -106,7 +106,9 @@ def test_products_and_sums(kind: str, layout: str, seed: int) -> None:
 @each_operator
 @pytest.mark.parametrize("count", [0, 1, 2, 3, 40, 200])
 @pytest.mark.parametrize("seed", range(3))
-def test_parts_and_other_points(kind: str, layout: str, seed: int, count: int) -> None:
+def test_parts_and_other_points(
+    kind: str, layout: str, seed: int, count: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Among some, in any order, and onto others: on the lattice, off it, at one place, none."""
     rng = np.random.default_rng(seed)
     A = operator(kind, layout, rng, 400)
@@ -120,6 +122,8 @@ def test_parts_and_other_points(kind: str, layout: str, seed: int, count: int) -
     couplings: list[tuple[Coupling, Array]] = [(part, part.points)]
     couplings += [(part.onto(points), points) for points in targets]
     if kind == "scattered":
+        monkeypatch.setattr(scattered, "FEW_PAIRS", 0)
+        couplings += [(part.onto(points), points) for points in targets if len(points) and count]
         together = ScatteredInfluence(np.concatenate((mixed, part.points)), SCALE)
         couplings.append((JointCoupling(together, len(mixed)), mixed))
     for onto, points in couplings:

@@ -174,6 +174,12 @@ def test_spikes_and_drop_outs_are_named() -> None:
     places = np.array([[3, 0], [20, 30], [50, 50], [70, 10], [99, 99]])
     resolved[tuple(places.T)] += 3 * resolved.std() * np.array([1, -1, 1, -1, 1])
     assert (spikes(resolved) == places).all()
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        resolved = gaussian_filter(rng.normal(size=(200, 200)), 3.0)
+        stepped = np.rint(resolved / resolved.std()) * resolved.std()
+        resolved[rng.random(resolved.shape) < 0.1] = np.nan
+        assert len(spikes(resolved)) == len(spikes(stepped)) == 0
 
 
 def test_a_map_that_is_cut_off_at_the_top_is_named() -> None:

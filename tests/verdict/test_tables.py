@@ -271,6 +271,12 @@ def test_summits_without_a_header(tmp_path: Path) -> None:
     assert read_summits(path, tip_radius=1.0, how=how).positions.tolist() == [[0, 0.5], [1, 2]]
 
 
+def test_titles_above_columns_without_names(tmp_path: Path) -> None:
+    """They are no second row of the heading."""
+    path = tmp_path / put(tmp_path, "File,Operator,,,\n,,x,y,tip_radius\nA,0,1,2,3\nA,1,2,2,3\n")
+    assert read_summits(path, tip_radius=None).positions.tolist() == [[1, 2], [2, 2]]
+
+
 KEYED = Reading(keyed=True)  # as for the file of a scene
 
 
@@ -303,6 +309,11 @@ KEYED = Reading(keyed=True)  # as for the file of a scene
             "x,y,z,diameter,R\n0,0,0,2,1\n",
             "found neither, expected either a column tip_radius or the key tip_radius in the scene "
             'file; not used: diameter, R; columns = {tip_radius = "R"} in [asperities]',
+        ),
+        (
+            "x,y,z,temp\n0,0,0,2\n",
+            "found neither, expected either a column tip_radius or the key tip_ra"
+            'dius in the scene file; not used: temp; columns = {tip_radius = "NAME"}',
         ),
         ("x,y\n0,0\n0,0\n", "asperities 0 and 1"),
         *(
