@@ -208,7 +208,7 @@ def read_text_table(
         raise FileError(f"{path}: empty")
     above, (header, rows) = rows, _headed(rows, titles, style, known, is_map)
     found = {bare(cell).lower() for cell in header.cells} if header else set()
-    wanted = {it for it in known if not is_index(it)} if {*required} <= found else None
+    wanted = {it for it in known if not is_index(it)} if {*required[:1]} <= found else None
     if header and not is_map and (also := _also_heading(header, above, style, wanted)):
         both = f"rows {min(header.number, also)} and {max(header.number, also)}"
         expected = "the names of all columns in one row: unmerge cells and delete the other row"
