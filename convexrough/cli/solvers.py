@@ -155,10 +155,10 @@ def gallery(
             for row, each in zip(table, found.outcomes, strict=True)
         ]
         output.say({"profile": reported}, aligned([list(table[0]), *cells], left=1))
-        if solvers and (found.outcomes == "failed").any():
+        outcomes = {*found.outcomes.ravel().tolist()} if solvers else set()
+        if "failed" in outcomes:
             return common.SOLVER_FAILED
-        wrong = solvers and (found.outcomes == "wrong").any()
-        return common.NOT_CERTIFIED if wrong else common.DONE
+        return common.NOT_CERTIFIED if "wrong" in outcomes else common.DONE
     cases = [wing.case(name) for name in wanted]
     lines = []
     if show_list or export is None:

@@ -63,12 +63,12 @@ class ScatteredInfluence(coupling.Influence):
     name: ClassVar[coupling.Kind] = "scattered"
 
     def apply(self, loads: Array) -> Array:
-        dtype = np.float32 if loads.dtype == np.float32 else np.float64
-        if self.whole and dtype == np.float64:
+        single = loads.dtype == np.float32
+        if self.whole and not single:
             A, which = self.whole
             return A.apply(among_zeros(loads, which, len(A)))[which]
-        single = SINGLE_TOLERANCE, np.float32
-        product = self._product(1, *single) if dtype == np.float32 else self._double
+        dtype: Any = np.float32 if single else np.float64
+        product = self._product(1, SINGLE_TOLERANCE, dtype) if single else self._double
         if product is None:
             return self._dense.apply(loads.astype(np.float64, copy=False)).astype(dtype, copy=False)
         found = product.apply(loads.astype(dtype, copy=False))

@@ -44,11 +44,12 @@ def mean_field_indentation(problem: NormalProblem) -> Array:
     try:
         start = _mean_field(problem)
     except np.linalg.LinAlgError:
-        return on_hertz_pressure(problem)
-    return start if np.isfinite(start).all() else on_hertz_pressure(problem)
+        start = None
+    return on_hertz_pressure(problem) if start is None else start
 
 
-def _mean_field(problem: NormalProblem) -> Array:
+def _mean_field(problem: NormalProblem) -> Array | None:
+    """The result of `mean_field_indentation` from the rings; None if they lead to no solution."""
     count = max(4, min(RINGS, len(problem) // LEAST))
     # Rings of equal area: sphere and displacement are nearly linear in the squared distance.
     squares = problem.scene.asperities.distances[problem.candidates] ** 2  # not kept in memory
@@ -96,9 +97,9 @@ def _mean_field(problem: NormalProblem) -> Array:
             right = np.append(right, problem.load - float(P.sum()))
         step = np.linalg.solve(system, right)
         w, approach = w + step[:count], approach + float(step[count:].sum())
-        if np.abs(step).max() <= ENOUGH * abs(approach):
+        if np.abs(step).max() < ENOUGH * abs(approach):  # False for nan
             return np.asarray(approach + problem.offsets - between(w, places))
-    return on_hertz_pressure(problem)  # contacts are too crowded
+    return None  # contacts are too crowded
 
 
 def _disc(distance: Array, radius: Array) -> Array:

@@ -120,13 +120,9 @@ def read_table(
     missing = [name for name in required if name not in places]
     left = [bare(name) for i, name in enumerate(source.header or []) if i not in places.values()]
     others = [name for name in left if not is_index(name) and len(name) < 40]
-    other = (
-        quote(others[0])
-        if len(others) == 1 == len(missing)
-        else "NAME"
-        if source.header
-        else "NUMBER"
-    )
+    other = "NAME" if source.header else "NUMBER"
+    if len(others) == 1 == len(missing):
+        other = quote(others[0])
     pixels = instead and {"x", "y"} <= places.keys()
     arrays = path.suffix.lower() in ARRAYS
     naming = "save vectors with these names" if arrays else "add a first row with names"
