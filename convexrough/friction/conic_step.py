@@ -106,9 +106,9 @@ class ConicStepper(Stepper):
         limits[:, 0] = np.concatenate((half, (high - low) / 2.0))
         limits[n:, 1] = -(high + low) / 2.0
         program = ConeProgram(
-            quadratic=sparse.csc_matrix(sparse.block_diag(blocks)),
+            quadratic=sparse.csc_array(sparse.block_diag(blocks)),
             linear=linear,
-            constraints=sparse.csc_matrix(sparse.vstack((sums, bounds, powers.matrix))),
+            constraints=sparse.csc_array(sparse.vstack((sums, bounds, powers.matrix))),
             constant=np.hstack((step.total / N.sum(), total, limits.ravel(), powers.constant)),
             equalities=1 + n,
         )

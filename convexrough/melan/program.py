@@ -100,13 +100,13 @@ def _program(limits: Array, steady: Array, elastic: Array) -> ConeProgram:
     scaled[..., 1:] = -elastic / limits[:, None]
     constant[..., 0], constant[..., 1:] = 1.0, steady / limits[:, None]
     of_asperities = sparse.kron(sparse.diags_array(-1.0 / limits), np.eye(3, 2, -1))
-    balance = sparse.kron(np.ones((1, n)), np.eye(2))
+    balance = sparse.kron(np.ones((1, n)), sparse.eye_array(2))
     rests = sparse.kron(np.ones((m, 1)), of_asperities)
     rows: list[list[Any]] = [[None, balance], [scaled.reshape(-1, 1), rests]]
     return ConeProgram(
-        quadratic=sparse.csc_matrix((unknowns, unknowns)),
+        quadratic=sparse.csc_array((unknowns, unknowns)),
         linear=np.append(-1.0, np.zeros(2 * n)),
-        constraints=sparse.csc_matrix(sparse.block_array(rows)),
+        constraints=sparse.csc_array(sparse.block_array(rows)),
         constant=np.append(np.zeros(2), constant.reshape(-1)),
         equalities=2,
     )

@@ -13,7 +13,7 @@ from convexrough import checks
 from convexrough.solvers.programs import ConeProgram, QuadraticProgram
 
 if TYPE_CHECKING:
-    from scipy.sparse import csc_matrix
+    from scipy.sparse import csc_array
 
 
 def qpsolvers_npz(program: QuadraticProgram) -> bytes:
@@ -56,7 +56,7 @@ def clarabel_json(program: ConeProgram) -> bytes:
     return json.dumps(data).encode()
 
 
-def _columns(matrix: csc_matrix) -> dict[str, Any]:
+def _columns(matrix: csc_array) -> dict[str, Any]:
     matrix.sort_indices()
     return {
         "m": matrix.shape[0],
@@ -77,7 +77,7 @@ def cone_npz(program: ConeProgram) -> bytes:
     from scipy import sparse  # takes 0.1 s to import
 
     upper = program.quadratic
-    whole = sparse.csc_matrix(upper + sparse.triu(upper, 1).T)
+    whole = sparse.csc_array(upper + sparse.triu(upper, 1).T)
     parts = {
         f"{name}_{part}": getattr(matrix, part)
         for name, matrix in (("P", whole), ("A", program.constraints))

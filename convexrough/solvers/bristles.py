@@ -147,19 +147,19 @@ class BristleProgram:
         profile = depth[:, None] * (cell**2 - cell + 1 / 3) / m**2
         prescribed = problem.offsets + (problem.approach or 0.0)
 
-        rows = sparse.kron(sparse.identity(n), np.ones((m, 1)))  # one entry per bristle
-        bristles = sparse.hstack((rows, sparse.identity(n * m)))
-        means = sparse.hstack((sparse.csc_matrix((n, n)), rows.T / m))
+        rows = sparse.kron(sparse.eye_array(n), np.ones((m, 1)))  # one entry per bristle
+        bristles = sparse.hstack((rows, sparse.eye_array(n * m)))
+        means = sparse.hstack((sparse.csc_array((n, n)), rows.T / m))
         blocks = [bristles, means]
         lower, upper = np.zeros(n * m + n), np.concatenate((np.full(n * m, np.inf), np.zeros(n)))
         if problem.load is not None:
-            blocks.append(sparse.csc_matrix(np.repeat([1.0, 0.0], [n, n * m])[None]))
+            blocks.append(sparse.csc_array(np.repeat([1.0, 0.0], [n, n * m])[None]))
             lower, upper = np.append(lower, problem.load), np.append(upper, problem.load)
-        springs = sparse.diags(np.repeat(h / m, m))
+        springs = sparse.diags_array(np.repeat(h / m, m))
         return QuadraticProgram(
-            quadratic=sparse.csc_matrix(sparse.block_diag((np.triu(self.hessian), springs))),
+            quadratic=sparse.csc_array(sparse.block_diag((np.triu(self.hessian), springs))),
             linear=np.concatenate((profile.mean(axis=1) - prescribed, profile.ravel() / m)),
-            constraints=sparse.csc_matrix(sparse.vstack(blocks)),
+            constraints=sparse.csc_array(sparse.vstack(blocks)),
             lower=lower,
             upper=upper,
         )

@@ -323,7 +323,7 @@ class LiftedProgram:
         M = problem.influence.matrix[np.ix_(members, members)]
         np.fill_diagonal(M, problem.shells[members])
         upper = np.triu_indices(n)
-        quadratic = sparse.csc_matrix((M[upper], (p[upper[0]], p[upper[1]])), shape=(width, width))
+        quadratic = sparse.csc_array((M[upper], (p[upper[0]], p[upper[1]])), shape=(width, width))
         level = problem.approach_bound if problem.approach is None else problem.approach
         linear = np.zeros(width)
         linear[p] = -(level + problem.offsets[members])
@@ -331,13 +331,13 @@ class LiftedProgram:
         linear[z] = k_box * S / 3
 
         link = np.concatenate((np.ones(n), -boxes.loads)), (np.tile(p, 2), np.append(p, y3))
-        rows, right = [sparse.csc_matrix(link, shape=(n, width))], [np.zeros(n)]
+        rows, right = [sparse.csc_array(link, shape=(n, width))], [np.zeros(n)]
         if problem.load is not None:
             total = np.ones(n), (np.zeros(n, dtype=int), p)
-            rows.insert(0, sparse.csc_matrix(total, shape=(1, width)))
+            rows.insert(0, sparse.csc_array(total, shape=(1, width)))
             right.insert(0, np.array([problem.load]))
         power = power_cones(list(lift), width)
-        constraints = sparse.csc_matrix(sparse.vstack([*rows, power.matrix], format="csc"))
+        constraints = sparse.csc_array(sparse.vstack([*rows, power.matrix], format="csc"))
         constant = np.concatenate((*right, power.constant))
         return ConeProgram(quadratic, linear, constraints, constant, sum(map(len, right)))
 

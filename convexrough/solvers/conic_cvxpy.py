@@ -180,7 +180,8 @@ class LiftedModel:
             (e * (3 / 5 - S / 3)) @ y5
             + (e * S / 3) @ z
             + cp.quad_form(p, cp.psd_wrap(M)) / 2  # CVXPY's own check fails on some valid M
-            - (D0 + d) @ p
+            - D0 * cp.sum(p)
+            - d @ p
         )
 
         def cone(x: Any, y: Any, w: Any) -> Any:

@@ -17,7 +17,7 @@ from convexrough.errors import SolverError
 from convexrough.progress import log_step
 
 if TYPE_CHECKING:
-    from scipy.sparse import csc_matrix
+    from scipy.sparse import csc_array
 
 
 class ConeProgram(NamedTuple):
@@ -27,9 +27,9 @@ class ConeProgram(NamedTuple):
     second-order cone, s_1 >= || (s_2, s_3) ||.
     """
 
-    quadratic: csc_matrix  # P, upper triangle
+    quadratic: csc_array  # P, upper triangle
     linear: Array  # q
-    constraints: csc_matrix  # A
+    constraints: csc_array  # A
     constant: Array  # b
     equalities: int  # number of entries of s that are 0
 
@@ -57,9 +57,9 @@ class ConeProgram(NamedTuple):
         stationary = sparse.hstack((whole, self.constraints.T))
         constraints = sparse.vstack((stationary, sparse.hstack((nothing, -in_cones))))
         return ConeProgram(
-            quadratic=sparse.csc_matrix(quadratic),
+            quadratic=sparse.csc_array(quadratic),
             linear=np.concatenate((np.zeros(len(used)), self.constant)),
-            constraints=sparse.csc_matrix(constraints),
+            constraints=sparse.csc_array(constraints),
             constant=np.concatenate((-self.linear, np.zeros(rows - self.equalities))),
             equalities=len(self.linear),
         )
@@ -72,9 +72,9 @@ class ConeProgram(NamedTuple):
 class QuadraticProgram(NamedTuple):
     """minimise (1/2) x'P x + q'x  subject to  lower <= A x <= upper."""
 
-    quadratic: csc_matrix  # P, upper triangle
+    quadratic: csc_array  # P, upper triangle
     linear: Array  # q
-    constraints: csc_matrix  # A
+    constraints: csc_array  # A
     lower: Array
     upper: Array
 
@@ -140,6 +140,8 @@ def run_osqp(
     program: QuadraticProgram, solver: str, tolerance: float, max_iterations: int, verbose: bool
 ) -> RawAnswer:
     """The answer of OSQP, a first-order method with a final solution on the active set."""
+    from scipy.sparse import csc_matrix  # 0.1 s to import: only when solving
+
     osqp = load_library("osqp", solver)
     if int(osqp.__version__.split(".")[0]) < 1:
         what = f"OSQP {osqp.__version__} is too old"
@@ -147,7 +149,9 @@ def run_osqp(
     method = osqp.OSQP()
     try:
         limits = {"eps_abs": tolerance, "eps_rel": tolerance, "max_iter": max_iterations}
-        method.setup(*program, verbose=verbose, polishing=True, **limits)
+        quadratic, linear, constraints, *bounds = program
+        sides = csc_matrix(quadratic), linear, csc_matrix(constraints)  # OSQP warns of arrays
+        method.setup(*sides, *bounds, verbose=verbose, polishing=True, **limits)
         found = method.solve(raise_error=True)
     except osqp.OSQPException as error:
         reasons = {int(status): status.name for status in osqp.SolverStatus}

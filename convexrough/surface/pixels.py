@@ -82,7 +82,8 @@ def _passes(ranks: NDArray[np.intp], owners: Indices, count: int) -> Indices:
     highest_first = np.argsort(-rank)
     pairs, new = np.unique((first * count + second)[highest_first], return_index=True)
     weights = (ranks.size - rank[highest_first[new]]).astype(np.float64)  # from 1: 0 is no edge
-    graph = coo_array((weights, np.divmod(pairs, count)), shape=(count, count))
+    ends = np.array(np.divmod(pairs, count), dtype=np.intc)  # scipy < 1.17.1 accepts no other type
+    graph = coo_array((weights, tuple(ends)), shape=(count, count))
     tree = minimum_spanning_tree(graph.tocsr()).tocoo()
 
     passes = np.zeros(count, dtype=np.intp)

@@ -174,23 +174,23 @@ class FrictionProgram:
         unit, more = np.repeat(self.small * P, 2), (len(lift.orders) - 1) * n
         M = problem.kernel.copy()
         M[np.diag_indices(2 * n)] += np.repeat(problem.share * problem.compliance, 2)
-        upper = sparse.csc_matrix(np.triu(M * (unit / self.energy) * unit[:, None]))
+        upper = sparse.csc_array(np.triu(M * (unit / self.energy) * unit[:, None]))
         counted = (P * problem.thresholds / self.energy)[:, None] * small**lift.orders
         lifted = (counted * (lift.energy[0] + problem.share * lift.energy[1]))[:, 1:]
 
         rows = self._rows()
         vectors = np.zeros((rows.shape[1], 2))
         vectors[[1, 2], [0, 1]] = 1.0
-        balance = sparse.kron((self.small * P)[None] / self.force, sparse.identity(2))
+        balance = sparse.kron((self.small * P)[None] / self.force, sparse.eye_array(2))
         blocks = (np.ascontiguousarray(rows[:, :, 1:]), np.arange(n), np.arange(n + 1))
-        forces = sparse.csc_matrix(sparse.kron(sparse.identity(n), vectors))
-        cones = sparse.hstack([forces, sparse.csc_matrix(sparse.bsr_matrix(blocks))])
-        totals = sparse.hstack([balance, sparse.csc_matrix((2, more))])
-        constraints = sparse.csc_matrix(sparse.vstack([totals, -cones]))
+        forces = sparse.csc_array(sparse.kron(sparse.eye_array(n), vectors))
+        cones = sparse.hstack([forces, sparse.csc_array(sparse.bsr_array(blocks))])
+        totals = sparse.hstack([balance, sparse.csc_array((2, more))])
+        constraints = sparse.csc_array(sparse.vstack([totals, -cones]))
         constraints.eliminate_zeros()
-        quadratic = sparse.block_diag((upper, sparse.csc_matrix((more, more))))
+        quadratic = sparse.block_diag((upper, sparse.csc_array((more, more))))
         return ConeProgram(
-            quadratic=sparse.csc_matrix(quadratic),
+            quadratic=sparse.csc_array(quadratic),
             linear=np.concatenate((np.zeros(2 * n), lifted.ravel())),
             constraints=constraints,
             constant=np.concatenate((self.total / self.force, rows[:, :, 0].ravel())),

@@ -90,7 +90,7 @@ def test_cone_programs_by_another_solver(name: str, pack: Path, index: Any) -> N
 
     def matrix(part: Any) -> Any:
         columns = part["nzval"], part["rowval"], part["colptr"]
-        return sparse.csc_matrix(columns, shape=(part["m"], part["n"]))
+        return sparse.csc_array(columns, shape=(part["m"], part["n"]))
 
     given = {"P": matrix(data["P"]), "A": matrix(data["A"])}
     given |= {"b": np.array(data["b"]), "c": np.array(data["q"])}

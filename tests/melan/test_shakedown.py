@@ -13,7 +13,7 @@ from multiprecision import solve_linear
 from numpy.testing import assert_allclose
 from path_scenes import LARGEST, PAPER, SCENES, shaded
 from scenes import on_sphere, solve_exactly, twins
-from scipy.sparse import csc_matrix
+from scipy.sparse import csc_array
 from vector_oracle import tangential_kernel
 
 import convexrough as cr
@@ -144,9 +144,9 @@ class Stuck:
         n, scale, unit = len(self.P), np.abs(self.K).max(), self.P.max()
         bounded = np.kron(np.eye(n), [[0.0, 0.0], [-1.0, 0.0], [0.0, -1.0]])
         program = ConeProgram(
-            csc_matrix(np.triu(self.K) / scale),
+            csc_array(np.triu(self.K) / scale),
             -self.K @ (self.q / unit) / scale,
-            csc_matrix(np.vstack((np.tile(np.eye(2), n), bounded))),
+            csc_array(np.vstack((np.tile(np.eye(2), n), bounded))),
             np.append(total, np.kron(self.P, [1.0, 0.0, 0.0])) / unit,
             2,
         )

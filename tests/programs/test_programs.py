@@ -29,7 +29,7 @@ def energy(control: str) -> float:
 
 def matrix(data: Any, name: str, shape: tuple[int, int]) -> Any:
     parts = [data[f"{name}_{part}"] for part in ("data", "indices", "indptr")]
-    return sparse.csc_matrix(tuple(parts), shape=shape)
+    return sparse.csc_array(tuple(parts), shape=shape)
 
 
 def by_scs(path: Path) -> tuple[Any, Any, float]:
