@@ -154,7 +154,7 @@ class Contact(Cached, Table, Plottable):
         >>> print(contact.proof().proved.splitlines()[0])
         proved: under the approach 5e-05 there is a solution, the only one
         """
-        from convexrough.proof import prove, refuse_many  # a higher layer
+        from convexrough.proof import prove, refuse_many
 
         refuse_many(self.scene)
         given = [*sheared] if isinstance(sheared, Iterable) else [sheared]

@@ -11,7 +11,8 @@ the best nor the worst.
 
 The derivative with respect to the height of an open asperity is zero, so no optimiser raises it:
 start from random heights, several times. Where an asperity makes contact the gradient has a kink,
-so second derivatives do not exist there: use a first-order method.
+so second derivatives do not exist there: use a method that needs only first derivatives, such as
+L-BFGS-B.
 """
 
 from __future__ import annotations

@@ -5,7 +5,8 @@ deviation of the loss is that of the heights times the length of the gradient of
 estimate needs no sampling. It holds as long as the deviation of the heights is small compared with
 the smallest gap and the smallest indentation. For larger deviations, asperities make and lose
 contact, and the estimate is too small. But the first-order term is still a good control variate:
-its mean over the random heights is 0, so subtract it from every sample and average the remainder.
+its mean over the random heights is 0, so subtract it, multiplied by a fitted coefficient, from
+every sample and average the remainder.
 
     python examples/scatter_of_heights.py --samples 400
 """

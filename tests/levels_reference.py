@@ -1,4 +1,4 @@
-"""Normal solutions at any load in 100 digits and all that friction makes of them: the reference.
+"""Normal solutions at any load in 130 digits and all that friction makes of them: the reference.
 
 Two levels make friction states by `multiprecision.slide`; where order fails `Bristles` follow.
 """

@@ -75,7 +75,8 @@ def plan_of(
     if grid is None:
         varied = {key.partition(".")[0] for _, key in swept(table_in(contents, "sweep"))}
         others = validate({name: it for name, it in tables.items() if name not in varied})[1]
-        rest = [each for each in others if "missing table" not in each]
+        unknown = ["missing table", *["[asperities] seed: missing"] * ("seeds" in table)]
+        rest = [each for each in others if not any(it in each for it in unknown)]
         raise SceneFileError(str(path), [*mistakes, *random, *rest])
     study, mistakes = _of_values(grid, tables)
     if study is None or mistakes or random:
@@ -106,8 +107,10 @@ def _of_values(grid: Grid, tables: Mapping[str, Any]) -> tuple[Study | None, lis
     first, seed = grid.point(0)
     study, mistakes = validate(with_values(tables, first, seed))
     for where, lists in (("together", grid.together), ("over", grid.over)):
-        for key, values in lists.items() if study else ():
-            for i, value in enumerate(values[1:], 1):
+        for key, values in lists.items():
+            named, here = "[{}] {}:".format(*key.split(".", 1)), f"[sweep] {where}.{key}[0]: "
+            mistakes = [here + each if each.startswith(named) else each for each in mistakes]
+            for i, value in enumerate(values[1:] if study else (), 1):
                 _, wrong = validate(with_values(tables, {**first, key: value}, seed))
                 mistakes += [f"[sweep] {where}.{key}[{i}]: {mistake}" for mistake in wrong]
     return study, grid.blame(mistakes, seed)

@@ -68,8 +68,8 @@ class _Source(NamedTuple):
         if self.header is not None:
             return shortened(", ".join(self.header)) + in_sheet(str(self.style))
         columns, rows = len(self.columns), len(self.rows)
-        turned = f" of {rows}: transposed?" if columns > rows > 1 else ""
-        return f"no header and {columns} columns{turned}"
+        turned = f" and {rows} rows: transposed?" if columns > rows > 1 else ""
+        return f"no header, {columns} columns{turned}"
 
     def numbers_or_text(self, place: int) -> NDArray[Any]:
         """A column as numbers if all of its cells are, else as text."""

@@ -3,8 +3,8 @@ r"""
 =========================
 
 **Claim.** Which of two asperities touch follows from four systems of equations: exactly one of them
-has an admissible solution. This solution is also the minimum of an energy over the loads that are
-not negative.
+has an admissible solution (on a border, two have the same). This solution is also the minimum of an
+energy over the loads that are not negative.
 
 A flat stamp is lowered on two asperities, 1 and 2. It prescribes the displacement :math:`D_i` of
 asperity :math:`i` if the asperity touches. The displacement :math:`w_i` of an asperity has two

@@ -3,8 +3,8 @@ r"""
 ================================================
 
 **Claim.** In powers of the contact radius, the energy that no modelling language accepts becomes a
-second-order cone program with four cones per asperity. The program is exact: it has the same
-minimum and the same loads.
+second-order cone program with four cones per asperity. If no contact discs overlap, the program is
+exact: it has the same minimum and the same loads.
 
 The shell lemma (lesson 3) leaves for each asperity the local energy
 :math:`h(P) = \tfrac 3 5 k P^{5/3} - \tfrac 1 2 \sigma P^2` with :math:`\sigma = 1 / (\pi E^* s)`.

@@ -118,8 +118,8 @@ assert period > 1
 # .. math:: F(\delta) = \delta + A P(\delta) - D = 0 .
 #
 # :math:`F` is once differentiable, so Newton's method applies. The signs of the solution give the
-# active set. A step that does not make the residual smaller is halved. If the energy is convex
-# (lesson 3), the linear system of a step always has a solution.
+# active set. A step that does not make the residual smaller is halved. If the Hessian of the energy
+# is positive definite at the loads of a step (lesson 3), its linear system has a solution.
 
 
 def normal_map(k: Array, A: Array, D: Array) -> tuple[Array, int]:

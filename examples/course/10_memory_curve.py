@@ -166,8 +166,9 @@ plt.show()
 # total shear force alone, because the forces :math:`N_b` add up to the total load in any scene.
 #
 # The elastic problem is solved once per corner :math:`s_k`, as a normal contact with loads
-# :math:`P_i(s_k)` and approach :math:`D_0(s_k)`. With the change :math:`c_k` of slope at the
-# corner, the shear forces and the displacement are
+# :math:`P_i(s_k)` and approach :math:`D_0(s_k)`. Let :math:`c_k` be the slope below the corner
+# minus the slope above it; beyond the ends of the curve the slope is 0. The shear forces and the
+# displacement are
 #
 # .. math:: Q_i = f \sum_k c_k P_i(s_k), \qquad X = c_t f \sum_k c_k D_0(s_k) .
 
@@ -239,7 +240,8 @@ assert worst < 2e-3
 # contact at a smaller load is part of the contact at a larger one, and the level at which a
 # bristle comes into contact is well defined. The field ``order`` of a result says whether order is
 # proved. It can fail: place a low, small summit between five crowded ones. Under a large load they
-# lower the surface under it faster than the sphere approaches.
+# lower the surface under it faster than the sphere approaches. (Contact discs overlap here, so this
+# example shows only the mathematics; one without overlap is ``examples/losing_contact.py``.)
 
 turn = 2 * np.pi * np.arange(5) / 5
 points = np.vstack(([0.0, 0.0], np.column_stack((np.cos(turn), np.sin(turn)))))

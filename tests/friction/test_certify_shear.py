@@ -23,7 +23,7 @@ def spoiled(contact: cr.Contact, force: float, kind: str, seed: int) -> Any:
 
 
 def assert_covers(judged: cr.ShearCertificate, forces: Any, name: str, fraction: float) -> None:
-    """No bound is too small and no status is wrong, by 80 digits."""
+    """No bound is too small and no status is wrong, by 130 digits."""
     truth = exact(name, fraction)
     assert (off(forces, truth.forces) <= judged.force_errors).all()
     assert (judged.status != np.where(truth.slips > 0, "partial", "sliding")).all()

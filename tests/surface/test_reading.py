@@ -297,6 +297,7 @@ def test_an_esri_grid(tmp_path: Path, width: int) -> None:
         *("values in Angstrom", "scale factor 0.001", "dx = 0.5", "lateral resolution 0.5 µm/px"),
         *("ZCal: 0.5", "Gain: 0.5", "heights multiplied by two", "Mult 2", "heights in waves"),
         *("z in counts", "volts", "z * 1000", "Faktor 0,5", "heights x1000", "LSB=0.1", "inverted"),
+        *("heights in mils", "height unit: inch"),
         *("Depth (positive down)", "Z axis points down"),
         *("高度: 128.0 微米", "z unit: nm; pixel size 1 um", "in um", "z [um]"),
     ],

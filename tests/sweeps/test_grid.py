@@ -86,6 +86,8 @@ def test_a_table_with_its_own_loads_is_named() -> None:
         assert plan.manifest["own_loads"] == own
 
 
+ROUGH = {**SMALL["asperities"], "height_std": 1e-7}  # seeds are those of the sweep
+
 WRONG = [
     ({k: v for k, v in SMALL.items() if k != "sweep"}, "[sweep]: missing table"),
     (tables(sweep={"sede": 3}), '[sweep] sede: unknown key, did you mean "seeds"?'),
@@ -102,7 +104,7 @@ WRONG = [
      "together: found [1, 2] values, expected as many for every key"),
     (sweeping(seeds=3), "seeds: nothing is random"),
     (sweeping(seeds=3, over={"asperities.heigth_std": [1e-7]}),
-     '[asperities] heigth_std: unknown key, did you mean "height_std"?'),
+     '[sweep] over.asperities.heigth_std[0]: [asperities] heigth_std: unknown key, did you mean'),
     (sweeping(seeds=1, draw={"sphere.radius": {"uniform": [2, 1]}}),
      "uniform = [low, high] with low < high"),
     (tables(sweep={"measure": ["los"]}), 'measure: found "los", expected a number of the tables '
@@ -122,9 +124,8 @@ def test_mistakes(contents: dict[str, Any], said: str) -> None:
 
 def test_all_mistakes_are_told_at_once() -> None:
     wrong = sweeping(seeds=0, over={"load": [1.0], "normal.load": []})
-    wrong = {**wrong, "sphere": {"radius": -1}}
+    wrong = {**wrong, "sphere": {"radius": -1}, "asperities": ROUGH}
     said = mistakes(wrong).splitlines()
     assert [line.split(": ")[1] for line in said] == [
-        "[sweep] seeds", "[sweep] over.normal.load", "[sweep] over.load", "[sweep] seeds",
-        "[sphere] radius",
+        "[sweep] seeds", "[sweep] over.normal.load", "[sweep] over.load", "[sphere] radius",
     ]  # fmt: skip

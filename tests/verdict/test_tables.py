@@ -211,7 +211,7 @@ def test_loads_at_a_slightly_different_place(tmp_path: Path) -> None:
         ("loads\n1\n2\n3\n", "found 'loads', expected a known column; did you mean \"load\"?"),
         ("x,y,load\n0,0,1\n0,0,1\n1,0,1\n", "row 3: found the same position as in row 2"),
         ("x,y,load\n0,0,1\n1,0,1\n0,2,1\n", "row 4: found position [0.0, 2.0], 0.707107 from"),
-        ("1,2\n1,2\n1,2\n", "columns: found no header and 2 columns, expected a column 'load'"),
+        ("1,2\n1,2\n1,2\n", "columns: found no header, 2 columns, expected a column 'load'"),
         ("1,2,3,4,5,6,7,8,9,0,1\n" * 9, "a map of pressures also needs coordinates: x, y and pres"),
         ("1,2,3\n4,5,6\n7,8,9\n", "columns 1, 2: found 0 positions of asperities in 3 rows"),
         ("node,load\n103,1\n101,1\n102,1\n", "column node: found 103, expected at most 3, the"),
