@@ -17,6 +17,7 @@ from typing import Any, ClassVar, NamedTuple, TypeAlias
 
 import numpy as np
 
+from convexrough import checks
 from convexrough.errors import InputError
 from convexrough.plottable import Plottable
 from convexrough.record import Along, Table, Variables, in_text
@@ -107,9 +108,12 @@ class MemoryCurve(Table, Plottable):
     ) -> tuple[MemoryCurve, list[Piece]]:
         """The state after a straight segment to (P, T) [force], and the pieces of its loss.
 
-        Raises InputError if |T| > P, which friction does not allow.
+        Raises InputError if a number is not finite, or |T| > P, which friction does not allow.
         """
-        load, height = Fraction(load), Fraction(height)
+        load, height = (
+            Fraction(it if isinstance(it, int | Fraction) else checks.finite(name, it))
+            for name, it in (("load", load), ("height", height))
+        )
         if abs(height) > load:
             expected = f"at most the load, {float(load)}, in size"
             raise InputError("T", found=float(height), expected=expected)

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -52,19 +53,19 @@ class Cycle(Table, Plottable):
     loss_first       : [force length] energy lost from the start without shear to the end of cycle 1
     loss_error, loss_first_error : proved bounds on the errors of the losses
     status           : "stuck" (no slip in the cycle), "partial" (a disc always sticks), "sliding"
-        (as a whole, once in each direction per cycle), "intermittent" (contact is lost in the
-        cycle), "open" (never loaded) or "undecided"
+        (as a whole, in each direction), "intermittent" (contact is lost in the cycle), "open"
+        (never loaded) or "undecided"
     slips            : [length] gross slip in each direction per cycle; nan where intermittent
     stick_radii      : [length] radius of the disc that always sticks
     slip_errors, stick_radius_errors : [length] proved bounds on the errors of these two
     level, force_level : [force] L* and f T*: from the second cycle on the memory curve
         (docs/theory/paths.md) is the same at every moment up to the load L*
     balance_defect   : relative difference between `loss` and the loss by (1) of
-        docs/theory/losses.md, as a check of rounding; nan if P varies or general steps are used
+        docs/theory/losses.md, as a check of rounding; nan unless `one_loop`, or for general steps
     loss_normalised  : loss / W0, with W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H). P is the highest load,
         nu Poisson's ratio, G the shear modulus, a_H the contact radius of a smooth sphere under P
-    smooth_normalised : loss of the smooth shape / W0; nan if P varies. Both ratios to W0 are nan
-        if no asperity is loaded, or if the solution for the smooth shape is not known
+    smooth_normalised : loss of the smooth shape / W0; nan unless `one_loop`. Both ratios to W0 are
+        nan if no asperity is loaded, or if the solution for the smooth shape is not known
     displacement_amplitude, displacement_error : [length] half the range of the displacement of one
         body relative to the other, at the points of the path, and proved bound on its error
     order            : what is proved about order between the lowest and the highest load at which
@@ -174,6 +175,11 @@ class Cycle(Table, Plottable):
         return Closed.around(levels, MemoryCurve.pressed(self.start), points)
 
     @property
+    def one_loop(self) -> bool:
+        """True if, at constant load, the shear force rises and falls once in a cycle."""
+        return self._walk.one_loop
+
+    @property
     def force_amplitude(self) -> float:
         """[force] half the range of the shear force."""
         return (self.maximum - self.minimum) / 2.0
@@ -225,7 +231,7 @@ class Cycle(Table, Plottable):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Loop(Table):
-    """Points of a closed loop, from the largest shear force to the smallest and back.
+    """Points of a closed loop, from the largest shear force through the path and back.
 
     asperities    : (k,) indices of the asperities whose own loops are given
     forces, displacements : (m,) shear force [force], and relative tangential displacement [length]
@@ -284,14 +290,16 @@ def loops(
     levels, f = contact.cached(FrictionLevels), Fraction(checks.friction(contact.scene.friction))
     loaded = levels.loads[chosen] > 0
     widest = max(each.force_amplitude for each in cycles)
-    way = (widest * (0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, points // 2 + 1)))[1:]).tolist()
+    parts = (0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, points // 2 + 1)))[1:-1]
+    way = [2 * Fraction(widest * part) / f for part in parts.tolist()]
     found = list[Loop]()
     for each in cycles:
         top, bottom = max(each.heights), min(each.heights)
-        drops = [min(2 * Fraction(w) / f, top - bottom) for w in way if w < each.force_amplitude]
-        drops.append(top - bottom)
-        LOGGER.info(f"computing {len(drops)} levels of a loop")
-        heights = [top, *(top - drop for drop in drops), *(bottom + drop for drop in drops)]
+        heights, k = [top], each.heights.index(top)
+        for here, there in pairwise([*each.heights[k:], *each.heights[:k], top]):
+            run, sign = abs(there - here), 1 if there > here else -1
+            heights += [here + sign * part for part in way if part < run] + [there] * (run > 0)
+        LOGGER.info(f"computing {len(heights)} levels of a loop")
         path = [(levels.load, height) for height in (top, bottom, *heights)]
         walk = Walk(levels, MemoryCurve.pressed(levels.load), path, steps=1)
         if each.order == "fails" and levels.proved:

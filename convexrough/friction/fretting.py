@@ -90,9 +90,11 @@ def fretting(cycle: Cycle) -> Fretting:
     f, R, levels = checks.friction(scene.friction), scene.relative_radii, walk.levels
     modulus = scene.material.contact_modulus
     unknown = np.nan if walk.general is not None else 0.0  # the memory curve does not hold
-    gross = cycle.slips / 2.0 + unknown
+    gaps = -levels.depths(walk.stuck[0])  # half the range of the slip of asperities that slide
+    travel = f * float(mindlin.ratio(scene.material.poisson_ratio))
+    gross = np.where(cycle.slips > 0, travel * np.maximum(gaps, 0.0), cycle.slips) + unknown
     a = stick_radii(levels, levels.at(walk.least))[0]
-    rim = f * float(mindlin.ratio(scene.material.poisson_ratio)) * a**2 / R
+    rim = travel * a**2 / R
     stuck = np.divide(cycle.stick_radii, a, out=np.zeros(len(a)), where=a > 0)
     in_part = rim * rim_gap(np.minimum(stuck, 1.0))
     mean = largest = np.full(len(scene), unknown)

@@ -174,7 +174,7 @@ def load_path(
     ([False, True, True], 4)
     """
     if general_steps is not None:
-        checks.whole("general_steps", general_steps)
+        general_steps = checks.whole("general_steps", general_steps)
     if not isinstance(solver, str) or solver not in STEPPERS:
         raise InputError("solver", found=repr(solver), expected=f"one of {', '.join(STEPPERS)}")
     stepper = STEPPERS[solver]

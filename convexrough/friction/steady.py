@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
+from fractions import Fraction
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -10,16 +13,17 @@ from numpy.typing import ArrayLike
 
 from convexrough import checks
 from convexrough.arithmetic.balls import Ball
-from convexrough.arrays import Array, frozen
+from convexrough.arrays import Array, among_zeros, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.friction import state
 from convexrough.friction.curve import MemoryCurve, Point
 from convexrough.friction.cycle import Cycle
-from convexrough.friction.levels import FrictionLevels
+from convexrough.friction.levels import FrictionLevels, rounded
 from convexrough.friction.path import walk_of
 from convexrough.friction.walk import Closed
 from convexrough.influence import Kind
+from convexrough.normal.level import Level
 from convexrough.progress import LOGGER
 from convexrough.scene.scene import Scene
 from convexrough.sphere import mindlin
@@ -172,26 +176,24 @@ def _cycle(contact: Contact, closed: Closed, spent: Ball, moved: Ball) -> Cycle:
     half = (moved[int(np.argmax(moved.value))] - moved[int(np.argmin(moved.value))]) * 0.5
     amplitude = float(half.value)
     rest, top, bottom = (levels.at(s) for s in (stuck, levels.load, closed.least))
-    kept, slides = bottom.touching, bottom.touching & rest.open
-    lost = top.touching & bottom.open
-    slips = (-levels.indentations(rest)).positive_part() * 2.0 * levels.travel_unit
-    doubtful = levels.to_scene(slides | ~(rest.touching | rest.open))
-    gross = np.where(levels.to_scene(kept), slips.value, 0.0)
-    gross[levels.to_scene(lost)] = np.nan
+    slides, lost = bottom.touching & rest.open, top.touching & bottom.open
+    slips, slip_errors = _slips(closed, rest, bottom)
+    slips[levels.to_scene(lost)] = np.nan
     radii, radius_errors = state.stick_radii(levels, rest)
     loaded, heights = zip(*closed.points[: closed.once], strict=True)
     reference = smooth_reference(contact.scene, contact.load) if levels.load else None
     defect = smooth = np.nan
-    if set(loaded) == {levels.load}:
+    if closed.one_loop:
         mean, run = (top.approach + rest.approach) * 0.5, top.load - rest.load
         other = (top.energy - rest.energy - run * mean) * 8.0 * levels.loss_unit
         defect = abs(float(other.value) - loss) / (loss or 1.0)
         if reference:
             smooth = float(mindlin.loss(float((max(heights) - min(heights)) / (2 * levels.load))))
-    if closed.general is not None:
-        first, both = closed.general.losses[[closed.once, -1]]
-        loss, defect = both - first, np.nan
-        amplitude = float(np.ptp(closed.general.states.displacements.value[closed.once :])) / 2.0
+    if (general := closed.general) is not None:
+        spent_by = np.append(0.0, general.losses[closed.once :: closed.once])  # the end of a cycle
+        each, defect = np.diff(spent_by), np.nan
+        first, loss = each[0], each[-1] if closed.settled(each) else np.nan
+        amplitude = float(np.ptp(general.states.displacements.value[-closed.once - 1 :])) / 2.0
     unknown = np.inf if order == "fails" else 0.0
     unproved = 0.0 if order == "proved" else np.inf
     statuses = {
@@ -208,8 +210,8 @@ def _cycle(contact: Contact, closed: Closed, spent: Ball, moved: Ball) -> Cycle:
         loss_first=float(first),
         loss_first_error=float(first_error + unproved),
         status=state.by_status(levels, top, **({} if unknown else statuses)),
-        slips=frozen(gross),
-        slip_errors=frozen(np.where(doubtful, slips.error, 0.0) + unknown),
+        slips=frozen(slips),
+        slip_errors=frozen(slip_errors + unknown),
         stick_radii=radii,
         stick_radius_errors=frozen(radius_errors + unknown),
         level=float(stuck),
@@ -226,3 +228,27 @@ def _cycle(contact: Contact, closed: Closed, spent: Ball, moved: Ball) -> Cycle:
     )
     found.__dict__["_walk"] = closed  # the cached property would follow the path again
     return found
+
+
+def _slips(closed: Closed, rest: Level, bottom: Level) -> tuple[Array, Array]:
+    """(N,) [length] the gross slip in each direction per steady cycle, and error bounds.
+
+    rest, bottom : the normal solutions at L* and at the least load
+
+    It is half the sum, over the pieces of a cycle, of c_t f (1 - c th) times the growth of the gap
+    as the front falls (docs/theory/paths.md, "Closed paths").
+    """
+    levels, weights = closed.levels, defaultdict[Fraction, Fraction](Fraction)
+    for piece in closed.cycles[1]:
+        share = (1 - piece.sign * piece.slope) / 2
+        weights[piece.bottom] += share
+        weights[piece.top] -= share
+    some = np.flatnonzero(~rest.touching & ~bottom.open)  # the others stick, or open
+    total = Ball.exact(np.zeros(len(some)))
+    for load, weight in weights.items() if len(some) else ():
+        total = total + (-levels.at(load).indentation[some]).positive_part() * weight
+    values, errors = rounded(total * levels.travel_unit)
+    sure = bottom.touching[some]  # 0 if the asperity opens
+    spread = partial(among_zeros, places=some, count=len(levels.candidates))
+    found, off = np.where(sure, values, 0.0), np.where(sure, errors, np.abs(values) + errors)
+    return levels.to_scene(spread(found)), levels.to_scene(spread(off))

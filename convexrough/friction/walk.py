@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from itertools import accumulate, chain
+from itertools import accumulate, chain, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,10 @@ from convexrough.friction.general_step import SteppedPath, Stepper, followed
 from convexrough.friction.levels import FrictionLevels, rounded
 from convexrough.friction.order import Order
 from convexrough.friction.state import States, losses, states_of, statuses_of
+
+#: Numbers of cycles that are followed by general steps until the loss of the last one changes by at
+#: most SETTLED of itself, or of a tenth of the first.
+CYCLES, SETTLED = (3, 6, 12), 1e-3
 
 #: Largest total number of vertices of the memory curves along a path. A vertex takes 300 bytes.
 MOST_VERTICES = 2 * 10**7
@@ -143,10 +147,36 @@ class Closed(Walk):
         return [*chain(*self.pieces[:end])], [*chain(*self.pieces[end:])]
 
     @cached_property
+    def general(self) -> SteppedPath | None:
+        """Results of general steps (see `Walk.general`) along so many cycles that their loss
+        settles, but at most the largest of `CYCLES`.
+        """
+        if self.order != "fails" or not self.levels.proved:
+            return None
+        points, found = list(self.points[: self.once]), None
+        for count in CYCLES:
+            found = followed(self.levels, self.start, [*points * count, points[0]])
+            if self.settled(np.diff(found.losses[self.once :: self.once], prepend=0.0)):
+                break
+        return found
+
+    def settled(self, losses: Array) -> bool:
+        """True if the losses of the cycles 1, 2, ... no longer change."""
+        change, limit = abs(losses[-1] - losses[-2]), SETTLED * max(losses[-1], 0.1 * losses[0])
+        return bool(change <= limit)
+
+    @cached_property
     def stuck(self) -> Point:
         """The point (L*, T*) through which the memory curve always passes from cycle 2 on."""
         plus, minus = min(p + t for p, t in self.points), min(p - t for p, t in self.points)
         return (plus + minus) / 2, (plus - minus) / 2
+
+    @property
+    def one_loop(self) -> bool:
+        """True if, at constant load, the shear force rises and falls once in a cycle."""
+        loads, heights = zip(*self.points[: self.once + 1], strict=True)
+        rises = [b > a for a, b in pairwise(heights) if a != b]
+        return len({*loads}) == 1 and sum(a != b for a, b in pairwise([*rises, *rises[:1]])) <= 2
 
     @property
     def least(self) -> Fraction:

@@ -207,18 +207,19 @@ def _just_touching(known: Levels, place: int, near: Ball) -> tuple[Level, Ball]:
 def cycle_gradient(cycle: Cycle, *, holding: Holding | None = None) -> Gradient:
     """The result of `Cycle.gradient`.
 
-    At constant load the loss W is given by (1) of docs/theory/losses.md. At varying load W is the
-    sum over the pieces of the second cycle (`Along`).
+    For one loop at constant load the loss W is given by (1) of docs/theory/losses.md. Otherwise W
+    is the sum over the pieces of the second cycle (`Along`).
     """
     contact, known = cycle.contact, with_friction(cycle)
     holding = control_held(contact, holding)
-    if (cycle.loads != float(known.load)).any():
-        m = len(cycle.loads)
+    if not cycle.one_loop:
+        paths, m = bool(np.ptp(cycle.loads)), len(cycle.loads)
         first = [(k % m, Fraction(0), Fraction(0)) for k in range(m + 1)]
         again = [((k + 1) % m, Fraction(1), Fraction(0)) for k in range(m)]
         points = zip(map(Fraction, cycle.loads.tolist()), cycle.heights, strict=True)
-        along = Along(known, Fraction(0), first + again, np.array([*points]))
-        return _gradient(contact, along, holding, paths=True, sharp=cycle.order == "proved")
+        start = Fraction(0) if paths else known.load
+        along = Along(known, start, first + again, np.array([*points]))
+        return _gradient(contact, along, holding, paths=paths, sharp=cycle.order == "proved")
     amplitude = (max(cycle.heights) - min(cycle.heights)) / 2
     top, low = known.top, level_below(known, "maximum", amplitude, holding)
     T, mean = top.load - low.load, (top.approach + low.approach) * 0.5
@@ -257,9 +258,6 @@ def path_gradient(
     steps = [(k, later[k], Fraction(far[k])) for k in range(m)]
     points = np.array([(curve.load, curve.height) for curve in path.curves])
     along = Along(known, Fraction(path.start), steps, points)
-    if path.load_constant and any(curve.load == abs(curve.height) for curve in path.curves):
-        expected = "forces below f P: in gross sliding a history has no derivative"
-        raise InputError("forces", found="gross sliding", expected=expected)
     sharp = path.order == "proved" or not spent.any()
     return _gradient(path.contact, along, holding, paths=not path.load_constant, sharp=sharp)
 
@@ -275,6 +273,9 @@ def _gradient(
     if paths and holding == "approach":
         expected = '"load", because the loads of all points are prescribed'
         raise InputError("holding", found='"approach"', expected=expected)
+    if not paths and any(abs(T) == P for P, T in along.points):
+        expected = "forces below f P: in gross sliding there is no derivative"
+        raise InputError("forces", found="gross sliding", expected=expected)
     known = along.known
     lost, moved = along.parts({} if paths else by_load(known.units))
     loss, far = (sum((part.value for part in parts), start=ZERO) for parts in (lost, moved))

@@ -16,9 +16,9 @@ from numpy.typing import ArrayLike
 from convexrough import checks
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact, press
-from convexrough.errors import InputError
+from convexrough.errors import InputError, SolverError
 from convexrough.friction.levels import FrictionLevels
-from convexrough.friction.onset import MOST_ONSETS, enclosed, last_to_touch
+from convexrough.friction.onset import MOST_ONSETS, Onset, enclosed, last_to_touch
 from convexrough.friction.order import Order
 from convexrough.influence import Kind
 from convexrough.melan.program import solve
@@ -215,10 +215,12 @@ def _exact(contact: Contact, t0: Fraction, p: Any, t: Any) -> dict[str, Any]:
     factors = np.full(len(contact.scene), np.nan)
     for asperity, onset in found.items():
         factors[asperity] = factor(onset.load)
-    sure = levels.at(worst.upper)
-    order = levels.order({worst.lower, worst.upper})
-    proved = order == "proved" and bool(levels.to_scene(sure.touching)[touching].all())
+    sure, top = levels.at(worst.upper), levels.top
     lower, upper = factor(worst.upper), factor(worst.lower)
+    highest = float(P0) + float(max(p)) * upper * (1 + SAFETY) if max(p) > 0 else 0.0
+    order = _order(contact, worst, highest)
+    proved = order == "proved" and bool((top.touching | top.open).all())
+    proved = proved and bool(levels.to_scene(sure.touching)[touching].all())
     height = float(t0) - (lower * float(plus - minus) / 2 if fall > 0 else 0.0)
     gaps = np.maximum(-levels.depths(worst.lower), 0.0) * (contact.loads > 0)
     rest = levels.to_scene(sure.loads.value * levels.units.force)
@@ -232,6 +234,19 @@ def _exact(contact: Contact, t0: Fraction, p: Any, t: Any) -> dict[str, Any]:
         "mechanism": gaps / (gaps.max() or 1.0),
         "order": order,
     }
+
+
+def _order(contact: Contact, onset: Onset, highest: float) -> Order:
+    """What is proved about order from loads near the `onset` to the highest load of the path."""
+    levels = contact.cached(FrictionLevels)
+    if highest > levels.load:
+        if not (np.isfinite(highest) and contact.certificate.scope == "global"):
+            return "fails"
+        try:
+            levels = press(contact.scene, load=highest).cached(FrictionLevels)
+        except SolverError:
+            return "fails"
+    return levels.order({onset.lower, onset.upper})
 
 
 def _fall(p: Any, t: Any) -> Any:
@@ -251,7 +266,8 @@ def _elastic(contact: Contact, t0: Fraction, t: Any) -> dict[str, Any]:
     gross = float(min(room / run if run > 0 else np.inf for room, run in ends))
     limits = np.abs(each.value)
     factor = min(float(limits.min()), gross)
-    proved = bool(q.positive.all())  # the solution holds for positive shares only
+    sure = problem.levels.top.touching | problem.levels.top.open
+    proved = bool(q.positive.all() and sure.all())  # the solution holds for positive shares only
     critical = np.arange(len(P)) == int(np.argmin(limits)) if factor < gross else np.ones(len(P))
     # The force at rest may lie from -P_i - factor q_i low to P_i - factor q_i high.
     travelled = np.outer(factor * q.value / unit, (float(low), float(high)))
