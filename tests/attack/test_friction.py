@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from flint import arb, ctx
 from friction_scenes import SCENES
-from gradient_oracle import assert_close, exact
-from levels_reference import Bristles, cycle_loss, judge_of, loss_and_displacement
+from levels_reference import Bristles, assert_close, cycle_loss, judge_of, loss_and_displacement
+from multiprecision import exact
 from path_scenes import LARGEST, PAPER, around, on_flat, shaded
 from scenes import MATERIAL, on_sphere
 

@@ -9,8 +9,18 @@ import numpy as np
 import pytest
 from flint import arb, ctx
 from friction_scenes import FRICTION, SCENES, pressed, with_friction
-from gradient_oracle import DIGITS, NAMES, STEP, Setup, assert_close, exact, known
-from levels_reference import judge_of, loss_and_displacement, of_setup
+from levels_reference import (
+    DIGITS,
+    NAMES,
+    STEP,
+    Setup,
+    assert_close,
+    judge_of,
+    known,
+    loss_and_displacement,
+    of_setup,
+)
+from multiprecision import exact
 from scenes import OPERATORS, hexagonal, paper, scattered, stepped
 
 import convexrough as cr

@@ -11,17 +11,18 @@ import numpy as np
 import pytest
 from flint import arb, ctx
 from friction_scenes import FRICTION, with_friction
-from gradient_oracle import (
+from levels_reference import (
+    DIGITS,
     NAMES,
     Judge,
     Oracle,
     Setup,
     assert_close,
     assert_slopes,
+    judge_of,
     known,
-    press,
+    level,
 )
-from levels_reference import DIGITS, Level, judge_of
 from multiprecision import exact, quotient, travel_of
 from path_scenes import shaded
 from scenes import hexagonal
@@ -95,7 +96,7 @@ def test_onset(holding: Any) -> None:
 
     def value(setup: Setup, near: Any) -> tuple[Any, Any]:
         """The root in Q of the gap at L, by secants."""
-        total = press(contact, setup, None).P.sum()
+        total = Oracle(setup, contact).load
 
         def gap(Q: Any) -> Any:
             left = (total - Q / setup.friction).mid()
@@ -103,7 +104,7 @@ def test_onset(holding: Any) -> None:
             loads = start.loads.copy()
             loads[asperity] = 0.0  # its own load counts for nothing there
             there = replace(setup, control=left, by_load=True)
-            lower = Oracle(there, exact(loads), arb(start.approach), 7)
+            lower = Oracle(there, replace(start, loads=loads))
             return lower.approach + lower.offsets[asperity] - lower.A[asperity] @ lower.loads
 
         last, root = onset * (1 - arb("1e-12")), near or arb(onset)
@@ -137,9 +138,9 @@ def walked(contact: cr.Contact, steps: Any, start: Any, weights: Any) -> Callabl
         def at(load: Fraction) -> tuple[Any, Any]:
             """V and D0; the highest asperity just touches at the load 0."""
             if load == 0:
-                return arb(0), -Level(setup, contact).offsets[np.argmax(contact.scene.offsets)]
+                return arb(0), -level(setup, contact).offsets[np.argmax(contact.scene.offsets)]
             there = replace(setup, control=quotient(load), by_load=True)
-            found = Level(there, near_to(contact.scene, float(load)))
+            found = level(there, near_to(contact.scene, float(load)))
             return found.energy, found.approach
 
         travel = travel_of(setup.friction, setup.poisson_ratio)

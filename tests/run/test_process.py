@@ -22,15 +22,6 @@ def module(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
 
 
-def test_help_imports_nothing_heavy() -> None:
-    heavy = {"pydantic", "matplotlib", "rich", "cvxpy", "scipy.spatial", "scipy.linalg"}
-    loaded = f"print(*({heavy} & set(sys.modules)))"
-    code = f"import sys, convexrough.cli as c; c.main(['--help']); {loaded}"
-    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert all(name in ran.stdout for name in ("run", "verify", "new", "paper"))
-    assert ran.stdout.splitlines()[-1] == ""
-
-
 def test_exit_status_of_a_process(tmp_path: Path) -> None:
     (tmp_path / "good.toml").write_text(scene_text())
     good = module("run", "good.toml", "--json", "--no-figures", cwd=tmp_path)
