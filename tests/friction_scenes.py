@@ -5,7 +5,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from flint import arb, ctx
 from scenes import NAMED, hexagonal
 
 import convexrough as cr
@@ -13,7 +12,6 @@ from convexrough import FrictionConic, VectorShearState, shear_vector
 from convexrough.sphere import hertz
 
 FRICTION = 0.5
-DIGITS = 80
 FRACTIONS = [1e-9, 1e-6, 1e-3, 0.1, 0.35, 0.37, 0.5, 0.7, 0.9, 0.999]
 NAMES = ["paper", "rough"]
 KINDS = ["dense", "lattice"]
@@ -54,13 +52,6 @@ def with_friction(scene: cr.Scene, friction: float = FRICTION, nu: float = 0.3) 
 #: name -> (scene, approach), with friction; "dense" has the crowding 0.88.
 SCENES = {name: (with_friction(scene), approach) for name, (scene, approach) in NAMED.items()}
 SCENES["dense"] = (with_friction(hexagonal(tip_radius=0.07, height_std=1e-6, seed=3)), 5e-5)
-
-
-def off(values: Any, true: Any) -> np.ndarray:
-    """(m,) upper bounds on |values - true|."""
-    both = zip(np.atleast_1d(values), np.atleast_1d(true), strict=True)
-    with ctx.workdps(DIGITS):
-        return np.array([float(abs(arb(float(value)) - it).upper()) for value, it in both])
 
 
 @cache

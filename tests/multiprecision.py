@@ -24,17 +24,22 @@ import numpy as np
 from flint import arb, arb_mat, ctx
 from numpy.typing import ArrayLike, NDArray
 
+Array: TypeAlias = NDArray[np.float64]
 Balls: TypeAlias = Any  # an arb, or an object array of arb: no dtype of numpy can say so
 
 GUARD_DIGITS = 30  # carried beyond the digits promised
 NEWTON_STEPS, HALVINGS = 200, 40  # generous: about ten steps are usual
-EXACT_BITS = 4096  # precision of `errors`: float64 minus reference, with no error of its own
 ZERO: Balls = arb(0)
 ONE: Balls = arb(1)
 
 exact = np.vectorize(arb, otypes=[object])
 mid = np.vectorize(arb.mid, otypes=[object])
 cube_root = np.vectorize(lambda ball: ZERO if ball == 0 else ball.root(3), otypes=[object])
+
+
+def middle(ball: Any) -> Any:
+    """The middle of a ball of the package, or of each, at working precision."""
+    return exact(ball.mid.high) + exact(ball.mid.low)
 
 
 def quotient(x: Fraction) -> arb:
@@ -80,8 +85,6 @@ def solve(
     That it is the only one anywhere follows if the energy is convex, which is not tested here.
     Far from convex (overlapping contact discs) Newton may need a `start`, else raise NotProved.
     """
-    if (approach is None) == (load is None) or (load is not None and load <= 0):
-        raise ValueError("prescribe either the approach or a positive load")
     by_load = load is not None
     with ctx.workdps(digits + GUARD_DIGITS):
         control = arb(approach if load is None else load)
@@ -199,14 +202,31 @@ def prove(problem: Any, x: Balls, *, radius: arb) -> Balls:
     return inside
 
 
-def inverse_sum(points: Balls, loads: Balls, row: int) -> arb:
-    """sum_j P_j / r_ij over the others of points (n, 2)."""
-    total = ZERO
-    for j, load in enumerate(loads):
-        if j != row and load != 0:
-            x, y = points[row] - points[j]
-            total += load / (x * x + y * y).sqrt()
-    return total
+def inverse_sum(points: Balls, loads: Balls, target: Balls, power: int = 1) -> Balls:
+    """sum_j P_j / r_j^power over the points (n, 2) that are not the target; (n,) or (n, k) P."""
+    away = target - points
+    squares = (away * away).sum(axis=1)
+    apart = np.flatnonzero(squares != 0)
+    return np.array([square.rsqrt() ** power for square in squares[apart]]) @ loads[apart]
+
+
+def inverse_sums(
+    targets: Array, points: Array, loads: Array, scale: float = 1.0, power: int = 1
+) -> tuple[Array, Array]:
+    """`scale` times these sums of 160 bits, as pairs of float64 numbers."""
+    with ctx.workprec(160):
+        places, forces = exact(points), arb(scale) * exact(loads)
+        sums = [inverse_sum(places, forces, target, power) for target in exact(targets)]
+        high = np.array(sums).astype(float)
+        return high, (np.array(sums) - exact(high)).astype(float)
+
+
+def pulled(points: Array, loads: Array, i: int, scale: float) -> Balls:
+    """The derivatives of scale sum_j P_j / r_ij with respect to the coordinates of point i."""
+    with ctx.workprec(160):
+        places = exact(points)
+        along = exact(loads)[:, None] * (places[i] - places)
+        return -arb(scale) * inverse_sum(places, along, places[i], 3)
 
 
 def gaps(scene: Any, loads: Sequence[arb], approach: arb, rows: Iterable[int]) -> list[arb]:
@@ -228,17 +248,15 @@ def _terms(
     modulus = arb(float(scene.material.contact_modulus))
     points, shape, law = of_scene(scene)
     for i in rows:
-        sunk = inverse_sum(points, loads, i) / (arb.pi() * modulus)
+        sunk = inverse_sum(points, np.array(loads), points[i]) / (arb.pi() * modulus)
         yield loads[i], law[i] * cube_root(loads[i])[()] ** 2, sunk, shape[i]
 
 
-def errors(values: ArrayLike, reference: Sequence[arb] | arb) -> NDArray[np.float64]:
-    """values - reference, subtracted in multiprecision [the unit of both]."""
-    balls = [reference] if isinstance(reference, arb) else reference
-    with ctx.workprec(EXACT_BITS):
-        return np.array(
-            [float(v - r) for v, r in zip(np.atleast_1d(exact(values)), balls, strict=True)]
-        )
+def off(values: Any, true: Any) -> Array:
+    """(m,) upper bounds on |values - true|."""
+    both = zip(np.atleast_1d(values), np.atleast_1d(true), strict=True)
+    with ctx.workdps(80):
+        return np.array([float(abs(arb(float(value)) - it).upper()) for value, it in both])
 
 
 def travel_of(f: arb, nu: arb) -> arb:
@@ -294,8 +312,6 @@ def assemble(
     summits: Balls, tips: Balls, heights: Balls, bends: Balls, modulus: arb, geometry: str
 ) -> tuple[Balls, Balls, Balls]:
     """Where asperities touch, (n, 2) [length], d_i = D_i - D0 and k_i, both (n,)."""
-    if geometry not in ("summit", "closest"):
-        raise ValueError(f'the geometry is "summit" or "closest", not {geometry!r}')
     # r R / (R + rho), with 1 / R
     points = summits if geometry == "summit" else summits / (1 + tips[:, None] * bends)
     law = cube_root(9 / (16 * modulus * modulus) * (bends.sum() / 2 + 1 / tips))
@@ -307,8 +323,6 @@ def coupling(points: Balls, modulus: arb) -> Balls:
     offsets = points[:, None, :] - points[None, :, :]
     squares = (offsets * offsets).sum(axis=2)
     np.fill_diagonal(squares, ONE)
-    if not (squares > 0).all():
-        raise ValueError("two asperities are in one place")
     influence = 1 / (arb.pi() * modulus * np.sqrt(squares))
     np.fill_diagonal(influence, ZERO)
     return influence

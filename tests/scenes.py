@@ -7,6 +7,7 @@ from typing import Any
 
 import multiprecision
 import numpy as np
+from flint import arb, ctx
 from hypothesis import strategies as st
 from point_layouts import lattice_patch, turned
 
@@ -67,11 +68,9 @@ def prescribed(scene: cr.Scene, approach: float, control: str) -> dict[str, floa
 
 def complementary_energy(contact: cr.Contact) -> float:
     """V = sum (3/5) k P^(5/3) + P'AP / 2 - d'P, from docs/theory/convexity.md, (1)."""
-    scene, P, E = contact.scene, contact.loads, contact.scene.material.contact_modulus
-    k = np.cbrt(9 / (16 * E**2 * scene.relative_radii))
-    apart = np.hypot(*np.moveaxis(scene.contact_points[:, None] - scene.contact_points, -1, 0))
-    np.fill_diagonal(apart, np.inf)
-    return float(0.6 * k @ P ** (5 / 3) + P @ (1 / (np.pi * E * apart)) @ P / 2 - scene.offsets @ P)
+    with ctx.workdps(50):
+        loads = multiprecision.exact(contact.loads)
+        return float(multiprecision.energy(contact.scene, loads, arb(0)))
 
 
 def stepped(scene: cr.Scene, by: float, steps: dict[str, Any]) -> cr.Scene:

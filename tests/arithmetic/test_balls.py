@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from extended import middle
 from flint import arb, ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from multiprecision import middle
 
 from convexrough.arithmetic.balls import Ball, residual
 from convexrough.arithmetic.pairs import MANY, Pair, two_sum

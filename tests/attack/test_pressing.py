@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from attacks import assert_honest, excess
+from attacks import excess
 from scenes import PAPER_APPROACH, STEEL, on_sphere, paper, reference
-from status_audit import Tally
+from status_audit import assert_honest, compare
 
 import convexrough as cr
 
@@ -63,7 +63,7 @@ def test_errors_of_a_claim_are_not_short_by_a_rounding() -> None:
     for _ in range(20):
         claimed = 10.0 ** rng.uniform(-7, 0, 61)
         verdict = cr.verify(scene, claimed, approach=PAPER_APPROACH)
-        Tally().compare("", "load", verdict.errors, claimed, exact.loads)
+        compare("load", verdict.errors, claimed, exact.loads)
 
 
 @pytest.mark.parametrize(("load", "apart"), [(0.003, 1.5e-6), (0.03, 1.5e-6), (0.003, 2.2e-6)])

@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from attacks import ATTACKS, assert_honest, attack
+from attacks import ATTACKS, attack
 from friction_scenes import FRICTION, lengths, pressed
 from numpy.testing import assert_allclose
 from scenes import NAMED, PAPER_APPROACH, hexagonal, paper, reference
+from status_audit import assert_honest
 
 import convexrough as cr
 from convexrough import FrictionNewton, shear_vector

@@ -5,10 +5,11 @@ from typing import Any
 import numpy as np
 import pytest
 from attacks import ATTACKS, attack
-from friction_scenes import FRACTIONS, FRICTION, KINDS, NAMES, in_doubt, off, pressed, with_friction
+from friction_scenes import FRACTIONS, FRICTION, KINDS, NAMES, in_doubt, pressed, with_friction
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from levels_reference import reference as exact
+from multiprecision import off
 from scenes import paper, twins
 
 import convexrough as cr

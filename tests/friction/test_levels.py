@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 from flint import arb, ctx
-from friction_scenes import FRACTIONS, FRICTION, KINDS, NAMES, SCENES, off, pressed
+from friction_scenes import FRACTIONS, FRICTION, KINDS, NAMES, SCENES, pressed
 from levels_reference import DIGITS, displaced, reference
+from multiprecision import off
 from numpy.testing import assert_allclose
 from scenes import hexagonal, paper
 

@@ -13,9 +13,8 @@ from typing import Any
 import multiprecision
 import numpy as np
 import pytest
-from extended import inverse_sums, middle, pulled
 from flint import arb, ctx
-from multiprecision import exact, quotient
+from multiprecision import exact, inverse_sums, middle, pulled, quotient
 from point_layouts import BASES, LAYOUTS, lattice_patch, loadings, on_lattice, turned
 from scenes import paper
 

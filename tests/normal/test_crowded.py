@@ -6,10 +6,11 @@ from typing import Any
 import multiprecision
 import numpy as np
 import pytest
-from attacks import assert_honest, excess
+from attacks import excess
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scenes import OPERATORS, hexagonal, on_sphere, operators, solve_exactly
+from status_audit import assert_honest
 
 import convexrough as cr
 from convexrough.arithmetic.pairs import Pair
@@ -61,7 +62,7 @@ def test_random_points_are_judged_honestly(
             exact = solve_exactly(scene, **control, start=contact.loads + 1e-30 * contact.load)
         except multiprecision.NotProved:
             continue
-        near = np.abs(multiprecision.errors(contact.loads, exact.loads)).max() < 1e-9 * contact.load
+        near = multiprecision.off(contact.loads, exact.loads).max() < 1e-9 * contact.load
         if judged.scope == "none" or not (near or judged.scope == "global"):
             continue  # the exact one is another solution
         assert_honest(judged, wrong, exact)

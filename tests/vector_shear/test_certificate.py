@@ -73,7 +73,7 @@ def test_statuses_and_bounds_against_exact_states(
     force = fraction * FRICTION * contact.load * np.array([np.cos(angle), np.sin(angle)])
     try:
         full = solve_exactly(scene, approach=approach, start=contact.loads, digits=60)
-        audit_vectors("usual", "dense", contact, full, force, Tally())
+        audit_vectors("usual", contact, full, force, Tally())
     except (NotProved, cr.SolverError):
         return  # neither the oracle nor Newton's method is on trial
 
