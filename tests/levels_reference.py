@@ -203,12 +203,12 @@ def known(gradient: cr.Gradient, name: str) -> tuple[Array, Array]:
 
 
 def assert_slopes(
-    judge: Judge, gradient: cr.Gradient, *, seed: int = 0, sharp: float = 0.0
+    judge: Judge, gradient: cr.Gradient, *more: str, seed: int = 0, sharp: float = 0.0
 ) -> None:
     """Every derivative within its bound of differences, arrays along random signs."""
     rng = np.random.default_rng(seed)
     names = NAMES if gradient.friction is not None else NAMES[:-1]
-    for name in (*names, "control"):
+    for name in (*names, *more):
         slopes, errors = known(gradient, gradient.holding if name == "control" else name)
         v = rng.choice([-1.0, 1.0], size=slopes.shape)
         assert_close(judge.difference(name, exact(v)[()]), slopes * v, errors, name, sharp)

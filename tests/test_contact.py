@@ -26,24 +26,6 @@ Case = tuple[cr.Scene, float, Kind]
 #: scenes, and 250 to 700 for matrices.
 LOOSE = {"dense": 1e4, "lattice": 3e4, "scattered": 3e4}
 
-#: Of the rings F to A: distance^2 / spacing^2, and loads computed independently.
-SQUARES = [0, 1, 3, 4, 7, 9]
-LOADS = [1.935817e-8, 1.759637e-8, 1.382348e-8, 1.183320e-8, 5.732965e-9, 2.196890e-9]
-
-
-@pytest.mark.parametrize("kind", operators(NAMED["paper"][0]))
-def test_the_papers_example(kind: Kind) -> None:
-    scene, approach = NAMED["paper"]
-    contact = cr.press(scene, approach=approach, influence=kind)
-    ring = np.round((scene.asperities.distances / 0.0025) ** 2)
-    assert (contact.status == "contact").sum() == 37
-    assert contact.load == pytest.approx(3.60853389e-7, rel=2e-9)
-    for square, load in zip(SQUARES, LOADS, strict=True):
-        assert_allclose(contact.loads[ring == square], load, rtol=3e-7)
-    assert contact.certificate.scope == "global"
-    assert contact.certificate.convexity_number == pytest.approx(0.504, abs=5e-4)
-    assert contact.model_error == pytest.approx(0.002, abs=5e-4)
-
 
 @pytest.mark.sample(5)
 @pytest.mark.parametrize("control", ["approach", "load"])

@@ -100,6 +100,8 @@ def test_a_run_says_what_the_package_says(run: Any, command: Any) -> None:
 
     file = read_scene("a.toml")
     contact = file.press()
+    assert contact.certificate.convexity_number == pytest.approx(0.504, abs=5e-4)
+    assert contact.model_error == pytest.approx(0.002, abs=5e-4)
     for name in ("scope", "convexity_number", "load_error", "gap_error"):
         assert proof[name] == getattr(contact.certificate, name)
     limit = 0.5 * contact.load

@@ -19,13 +19,9 @@ STEEL, ALUMINIUM = cr.Material.from_youngs(210e9, 0.3), cr.Material.from_youngs(
 BODIES = st.builds(cr.Material.from_youngs, st.floats(1e-3, 1e12), st.floats(0.0, 0.5))
 
 
-@given(BODIES)
-def test_two_bodies_of_one_kind_are_that_kind(body: cr.Material) -> None:
-    assert cr.Material.pair(body, body) == body
-
-
 @given(BODIES, BODIES)
 def test_compliances_add_up(one: cr.Material, other: cr.Material) -> None:
+    assert cr.Material.pair(one, one) == one
     both, E, G, nu = cr.Material.pair(one, other), *_constants(one, other)
     compliance = ((1 - nu**2) / E).sum()
     assert both.contact_modulus == pytest.approx(1 / compliance, rel=1e-14)
