@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from friction_scenes import FRICTION, pressed, with_friction
-from path_scenes import LARGEST, PAPER
+from friction_scenes import FRICTION, LARGEST, PAPER, pressed, with_friction
 from scenes import MATERIAL, PAPER_APPROACH, hexagonal, paper
 
 import convexrough as cr

@@ -6,11 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from attacks import ATTACKS, attack
 from friction_scenes import FRICTION, lengths, pressed
 from numpy.testing import assert_allclose
 from scenes import NAMED, PAPER_APPROACH, hexagonal, paper, reference
-from status_audit import assert_honest
+from status_audit import ATTACKS, assert_honest, attack
 
 import convexrough as cr
 from convexrough import FrictionNewton, shear_vector

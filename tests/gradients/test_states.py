@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from flint import arb, ctx
-from friction_scenes import FRICTION, with_friction
+from friction_scenes import FRICTION, shaded, with_friction
 from levels_reference import (
     DIGITS,
     Judge,
@@ -23,7 +23,6 @@ from levels_reference import (
     level,
 )
 from multiprecision import exact, quotient, travel_of
-from path_scenes import shaded
 from scenes import hexagonal
 
 import convexrough as cr

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from attacks import ATTACKS, attack, excess
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import (
@@ -24,7 +23,7 @@ from scenes import (
     solve_exactly,
     twins,
 )
-from status_audit import assert_honest
+from status_audit import ATTACKS, assert_honest, attack, excess
 
 import convexrough as cr
 from convexrough.arithmetic.pairs import Pair

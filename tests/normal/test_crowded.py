@@ -6,11 +6,10 @@ from typing import Any
 import multiprecision
 import numpy as np
 import pytest
-from attacks import excess
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scenes import OPERATORS, hexagonal, on_sphere, operators, solve_exactly
-from status_audit import assert_honest
+from status_audit import assert_honest, excess
 
 import convexrough as cr
 from convexrough.arithmetic.pairs import Pair

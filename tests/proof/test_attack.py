@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import proof_oracle
 import scenes
-from path_scenes import ring, shaded
+from friction_scenes import ring, shaded
 
 import convexrough as cr
 from convexrough import checker

@@ -1,4 +1,4 @@
-"""Material, asperities, scene: geometry by independent means, two bodies, and bad values."""
+"""Materials, asperities, and bases that are no sphere: by independent means and 50 digits."""
 
 from dataclasses import replace
 from typing import Any
@@ -7,11 +7,17 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from multiprecision import off
 from numpy.testing import assert_allclose
-from scenes import paper
+from proof_oracle import false_claims
+from scenes import MATERIAL, paper, rough, solve_exactly, stepped
+from status_audit import assert_honest
 
 import convexrough as cr
+from convexrough import checker
+from convexrough.normal.problem import NormalProblem
 from convexrough.scene.asperities import CUT_DEVIATIONS, largest_tip_radius
+from convexrough.scene.scene import reach
 from convexrough.sphere import mindlin
 from convexrough.vector_shear.problem import FrictionProblem
 
@@ -79,3 +85,108 @@ def test_random_heights_and_radii() -> None:
     assert both.tip_radii.std() / both.tip_radii.mean() == pytest.approx(0.3, rel=0.05)
     assert both.tip_radii.max() <= largest_tip_radius(2.0, 0.3)
     assert np.abs(both.heights).max() <= CUT_DEVIATIONS * 0.1
+
+
+INF = float("inf")
+BASES: dict[str, Any] = {"flat": INF, "ellipsoid": (1.0, 2.5), "cylinder": (INF, 0.8)}
+GEOMETRIES = ("summit", "closest")
+
+each_base = pytest.mark.parametrize("base", BASES.values(), ids=BASES.keys())
+each_geometry = pytest.mark.parametrize("geometry", GEOMETRIES)
+
+
+def on(base: Any, geometry: Any = "summit", friction: float = 0.5) -> cr.Scene:
+    """91 asperities with random heights and tip radii."""
+    return replace(rough(geometry), sphere_radius=base, friction=friction)
+
+
+@pytest.mark.sample(4)
+@each_base
+@each_geometry
+@pytest.mark.parametrize("control", [{"approach": 4e-5}, {"load": 3e-7}])
+def test_loads_are_those_to_50_digits(base: Any, geometry: Any, control: Any) -> None:
+    scene = on(base, geometry)
+    contact = cr.press(scene, **control)
+    exact = solve_exactly(scene, start=contact.loads, **control)
+    assert contact.certificate.scope == "global"
+    assert_honest(contact.certificate, contact.loads, exact)
+    assert off(contact.loads, exact.loads).max() <= 1e-13 * contact.loads.max()
+
+
+@pytest.mark.sample(2)
+@pytest.mark.parametrize("within", [0.03, 0.12])  # by one start of Newton's method and the other
+@pytest.mark.parametrize("control", [{"load": 2e-6}, {"approach": 2e-6}, {"approach": -5e-7}])
+def test_many_under_a_flat_base(within: float, control: Any) -> None:
+    regular = cr.Asperities.square(spacing=0.0035, tip_radius=0.02, within=within)
+    rough = regular.roughened(height_std=1e-6, tip_radius_cv=0.1, seed=2)
+    scene = cr.Scene(INF, rough, MATERIAL, friction=0.4, geometry="summit")
+    contact = cr.press(scene, **control)
+    assert contact.certificate.scope == "global"
+    assert not (contact.status == "undecided").any()
+    assert contact.certificate.load_error <= 1e-12 * contact.loads.max()
+    shallow = contact.loads[rough.heights < -contact.approach]
+    assert (shallow == 0).all()
+    if "load" in control:
+        problem = NormalProblem.assemble(scene, load=contact.load)
+        assert contact.approach <= problem.approach_bound * problem.units.length
+    state = cr.shear(contact, force=0.1 * contact.load)
+    assert state.certificate.scope == "global"
+
+
+@pytest.mark.parametrize("geometry", GEOMETRIES)
+def test_reach(geometry: Any) -> None:
+    """No asperity beyond it could touch, along the axis where the base bends away least."""
+    given: Any = dict(tip_radius=0.1, height=1e-5, geometry=geometry)
+    edge = reach(1e-4, sphere_radius=(0.5, 2.0), **given)
+    for factor, sign in ((0.999, 1), (1.001, -1)):
+        asperity = cr.Asperities([[0.0, edge * factor]], 0.1, 1e-5)
+        scene = cr.Scene((0.5, 2.0), asperity, MATERIAL, geometry=geometry)
+        assert np.sign(1e-4 + scene.offsets[0]) == sign
+    assert reach(1e-4, sphere_radius=INF, **given) == INF
+    assert reach(-1e-4, sphere_radius=(1.0, INF), **given) == 0
+
+
+@pytest.mark.sample(2)
+@pytest.mark.parametrize("base", [(1.0, 2.5), INF, (0.8, INF)])
+@each_geometry
+def test_proof_files(base: Any, geometry: Any) -> None:
+    """Proved in fractions, and true by 50 digits; with another radius the file is refused."""
+    contact = cr.press(on(base, geometry), load=3e-7)
+    state = cr.shear(contact, force=0.05 * contact.load)
+    document = contact.proof(sheared=[state]).document
+    assert checker.prove(document)
+    assert document["claims"]["scope"] == "global"
+    assert not false_claims(document)
+    radius = document["scene"]["sphere_radius"]
+    assert isinstance(radius, list) == isinstance(base, tuple)
+    for other in ("0x1.0p+0", ["inf", "0x1.8000000000000p-1"], [radius], ["inf"], "nan", "-inf"):
+        spoiled = {**document, "scene": {**document["scene"], "sphere_radius": other}}
+        with pytest.raises((checker.Refused, checker.Unreadable)):
+            checker.prove(spoiled)
+
+
+@pytest.mark.sample(2)
+@each_base
+@each_geometry
+def test_gradients(base: Any, geometry: Any) -> None:
+    """By heights, tips and positions against differences; forwards the same."""
+    scene, random, step = on(base, geometry), np.random.default_rng(4), 1e-4
+    sizes = {"heights": 1e-6, "tip_radii": 1e-2, "positions": 1e-4}
+    steps = {
+        name: size * random.standard_normal(getattr(scene.asperities, name).shape)
+        for name, size in sizes.items()
+    }
+
+    def loss(t: float) -> Any:
+        contact = cr.press(stepped(scene, t, steps), load=3e-7)
+        return contact, cr.cycle(contact, maximum=3e-8)
+
+    contact, cycle = loss(0.0)
+    gradient = cycle.gradient()
+    slope = sum((getattr(gradient, name) * each).sum() for name, each in steps.items())
+    (above, top), (below, bottom) = loss(step), loss(-step)
+    assert slope == pytest.approx((top.loss - bottom.loss) / (2 * step), rel=1e-4)
+    forwards = contact.change(cr.Direction(**steps)).approach
+    assert forwards == pytest.approx((above.approach - below.approach) / (2 * step), rel=1e-5)
+    assert gradient.sphere_radius is None
+    assert np.isfinite(gradient.height_errors).all()

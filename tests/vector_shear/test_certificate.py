@@ -2,13 +2,12 @@
 
 import numpy as np
 import pytest
-from attacks import ATTACKS, attack
 from friction_scenes import FRICTION, VECTOR_NAMES, found, in_doubt, lengths, pressed, with_friction
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from multiprecision import NotProved
 from scenes import random_scenes, scattered, solve_exactly
-from status_audit import Tally, audit_vectors
+from status_audit import ATTACKS, Tally, attack, audit_vectors
 
 import convexrough as cr
 from convexrough import FrictionNewton, shear_vector
