@@ -13,9 +13,8 @@ from typing import Any
 import multiprecision
 import numpy as np
 from flint import arb, ctx
-from multiprecision import Friction, slide, travel_of
+from multiprecision import Friction, slide, solve_vectors, travel_of
 from scenes import on_lattice, on_sphere, operators, scaled, scattered, solve_exactly
-from vector_oracle import solve_vectors
 
 import convexrough as cr
 from convexrough.arrays import Array

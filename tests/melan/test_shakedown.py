@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 from flint import arb
 from friction_scenes import LARGEST, PAPER, SCENES, shaded
-from multiprecision import solve_linear
+from multiprecision import solve_linear, tangential_kernel
 from numpy.testing import assert_allclose
 from scenes import on_sphere, solve_exactly, twins
 from scipy.sparse import csc_matrix
-from vector_oracle import tangential_kernel
 
 import convexrough as cr
 from convexrough.arrays import Array

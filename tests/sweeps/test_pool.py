@@ -18,7 +18,7 @@ from typing import Any
 
 import psutil
 import pytest
-from sweep_files import same, sweeping, swept, tables, toml
+from scene_files import same, sweeping, swept, tables, toml
 
 import convexrough as cr
 from convexrough.progress import logged
@@ -312,7 +312,7 @@ FULL = """
 import resource
 import convexrough as cr
 from convexrough.progress import logged
-from sweep_files import swept
+from scene_files import swept
 def fill(record):
     if "of 64 scenes" in record.getMessage():
         resource.setrlimit(resource.RLIMIT_FSIZE, (1000, resource.RLIM_INFINITY))

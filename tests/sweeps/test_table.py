@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scene_files import scene_text
+from scene_files import SMALL, numbers, same, scene_text, sweeping, swept, tables, toml
 from scenes import hexagonal, paper
-from sweep_files import SMALL, numbers, same, sweeping, swept, tables, toml
 
 import convexrough as cr
 from convexrough.sweeps.grid import Grid, with_values
