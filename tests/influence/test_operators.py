@@ -18,8 +18,18 @@ from flint import arb, ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from multiprecision import exact, inverse_sum, inverse_sums, middle, of_scene, pulled, quotient
-from point_layouts import BASES, LAYOUTS, jittered, lattice_patch, loadings, on_lattice, turned
-from scenes import on_sphere, paper, rough
+from scenes import (
+    BASES,
+    LAYOUTS,
+    jittered,
+    lattice_operator,
+    lattice_patch,
+    loadings,
+    on_sphere,
+    paper,
+    rough,
+    turned,
+)
 
 import convexrough as cr
 from convexrough.arithmetic.balls import Ball
@@ -54,7 +64,7 @@ def operator(kind: str, layout: str, rng: np.random.Generator, count: int = 0) -
     if kind == "lattice":
         count = count or int(rng.choice([40, 500, 1000]))
         points = lattice_patch(turned(BASES[layout], 0.3), count)
-        return on_lattice(points + rng.choice([0.0, 300.0, 1e6]), SCALE)
+        return lattice_operator(points + rng.choice([0.0, 300.0, 1e6]), SCALE)
     points = LAYOUTS[layout](rng)
     if kind == "dense":  # more than 64 points are summed in blocks
         return DenseInfluence.assemble(rng.permutation(points)[: count or 500], SCALE)
@@ -195,7 +205,7 @@ def at_line(k: int, call: Callable[[], Any], other: Callable[[], Any]) -> tuple[
 def interrupted(points: Array, ask: Any, own: Any, other: Any, first: Any) -> Iterator[Any]:
     """What `ask` returns for `own` if another thread asks for `other` at any moment."""
     for k in itertools.count():
-        A = on_lattice(points, SCALE)
+        A = lattice_operator(points, SCALE)
         ask(A, first)
         found, reached = at_line(k, partial(ask, A, own), partial(ask, A, other))
         yield found
@@ -212,7 +222,7 @@ def test_threads_that_restrict_one_operator_at_once_get_their_own() -> None:
 def test_threads_whose_loads_reach_unequally_far_get_their_own_sums() -> None:
     points = lattice_patch(turned(BASES["square"], 0.3), 60)
     near, everywhere = Pair.exact(np.eye(60)[0]), Pair.exact(np.ones(60))
-    true = on_lattice(points, SCALE).sums(near)
+    true = lattice_operator(points, SCALE).sums(near)
     for found in interrupted(points, LatticeInfluence.sums, near, everywhere, first=near):
         assert (np.abs((found - true).value) <= found.radius + true.radius).all()
 
@@ -318,7 +328,7 @@ def test_shells_do_not_overlap(seed: int) -> None:
     radii = rng.lognormal(0, rng.choice([0.0, 0.0, 3.0]), 120) * touching
     inverse, share = inverse_distances(points, points), rng.choice([0.0, rng.random(), 1.0])
     dense, mesh = DenseInfluence.assemble(points, SCALE), ScatteredInfluence(points, SCALE)
-    for A in (on_lattice(points, SCALE), mesh, dense):
+    for A in (lattice_operator(points, SCALE), mesh, dense):
         with np.errstate(divide="ignore"):
             fitted, halves = SCALE / fitted_shells(A, radii, share), SCALE / shells(A)
         for s in (fitted, halves):
@@ -330,7 +340,7 @@ def test_the_most_crowded_pair(basis: str) -> None:
     """Also if it is not one of nearest neighbours, at the ends of rows, and if none touches."""
     rng = np.random.default_rng(1)
     points = np.indices((6, 7)).reshape(2, -1).T @ np.array(BASES[basis])
-    A, mesh = on_lattice(points, SCALE), ScatteredInfluence(points, SCALE)
+    A, mesh = lattice_operator(points, SCALE), ScatteredInfluence(points, SCALE)
     dense = DenseInfluence.assemble(points, SCALE)
     for coverage in np.linspace(0.0, 0.2, 150):
         radii = rng.choice([1.0, 0.2], 42) * (rng.random(42) < coverage)

@@ -9,7 +9,7 @@ import pytest
 from flint import arb, ctx
 from multiprecision import exact, inverse_sum, middle, quotient
 from numpy.typing import NDArray
-from point_layouts import disc, lattice_patch, loadings, on_lattice
+from scenes import disc, lattice_operator, lattice_patch, loadings
 
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair
@@ -108,7 +108,7 @@ def perturbed(seed: int, count: int) -> Array:
 def test_points_are_where_they_are(seed: int, slices: int) -> None:
     """What points are off their sites is taken into account."""
     points = perturbed(seed, 120)
-    A = on_lattice(points, 1.0)
+    A = lattice_operator(points, 1.0)
     loads = np.random.default_rng(seed).random(120)
     found = A.sums(Pair.exact(loads), slices)
     worst = 0.0

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from multiprecision import off
+from multiprecision import false_claims, off
 from numpy.testing import assert_allclose
-from proof_oracle import false_claims
 from scenes import MATERIAL, paper, rough, solve_exactly, stepped
 from status_audit import assert_honest
 
