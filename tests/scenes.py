@@ -3,6 +3,7 @@
 from contextlib import suppress
 from dataclasses import replace
 from functools import cache
+from math import inf
 from typing import Any
 
 import multiprecision
@@ -111,8 +112,16 @@ def operators(scene: cr.Scene) -> tuple[Kind, ...]:
     return tuple(accepted)
 
 
-#: (name, operator): each named scene with each operator that it allows.
-CASES = [(name, kind) for name, (scene, _) in NAMED.items() for kind in operators(scene)]
+#: Bases that are no sphere, with an approach; and every named scene, and the rough ones on these.
+BASES = {"flat": (inf, 1e-6), "ellipsoid": ((1.0, 2.5), 4e-5), "cylinder": ((inf, 0.8), 4e-5)}
+EVERY = NAMED | {
+    f"rough on {base}, {geometry}": (replace(rough(geometry), sphere_radius=radii), approach)
+    for geometry in ("summit", "closest")
+    for base, (radii, approach) in BASES.items()
+}
+
+#: (name, operator): each of these scenes with each operator that it allows.
+CASES = [(name, kind) for name, (scene, _) in EVERY.items() for kind in operators(scene)]
 
 
 #: The proved solution, of 50 digits if no others are asked for, from a `start` if given.
@@ -241,7 +250,7 @@ def loadings(count: int, rng: np.random.Generator) -> np.ndarray:
     return np.array([equal, 10 ** rng.uniform(-30, 0, count), one, signs, few])
 
 
-BASES = {
+LATTICES = {
     "hexagonal": [[1.0, 0.0], [0.5, np.sqrt(0.75)]],
     "square": [[1.0, 0.0], [0.0, 1.0]],
     "rectangular": [[1.0, 0.0], [0.0, 2.6]],

@@ -11,7 +11,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from multiprecision import off
 from numpy.testing import assert_allclose
-from scenes import CASES, NAMED, hexagonal, operators, prescribed, random_cases, reference, scaled
+from scenes import (
+    CASES,
+    EVERY,
+    NAMED,
+    hexagonal,
+    operators,
+    prescribed,
+    random_cases,
+    reference,
+    scaled,
+)
 from status_audit import assert_honest
 
 import convexrough as cr
@@ -27,12 +37,12 @@ Case = tuple[cr.Scene, float, Kind]
 LOOSE = {"dense": 1e4, "lattice": 3e4, "scattered": 3e4}
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(9)
 @pytest.mark.parametrize("control", ["approach", "load"])
 @pytest.mark.parametrize(("name", "kind"), CASES)
 def test_fifty_digits(name: str, kind: Kind, control: str) -> None:
     """Loads and gaps against a proved multiprecision solution, and the bounds against the truth."""
-    scene, approach = NAMED[name]
+    scene, approach = EVERY[name]
     given = prescribed(scene, approach, control)
     contact = cr.press(scene, **given, influence=kind)
     certificate, exact = contact.certificate, reference(scene, **given)

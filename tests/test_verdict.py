@@ -19,6 +19,11 @@ from convexrough.normal.problem import NormalProblem
 from convexrough.testing import assert_agree, assert_certified, assert_shear_certified
 
 
+@pytest.fixture(scope="module")
+def contact() -> cr.Contact:
+    return cr.press(paper(), approach=PAPER_APPROACH)
+
+
 @cache
 def solved(seed: int, control: str) -> tuple[cr.Contact, dict[str, float]]:
     scene, approach = scattered(seed, 30, 0.2 + 0.02 * (seed % 25), [0.1, 0.3, 0.6][seed % 3])
@@ -93,8 +98,7 @@ def test_a_small_load_that_is_missing_does_not_pass() -> None:
     assert passed > 5  # whose statuses alone say that all is well
 
 
-def test_wrong_loads_do_not_pass_as_true() -> None:
-    contact = cr.press(paper(), approach=PAPER_APPROACH)
+def test_wrong_loads_do_not_pass_as_true(contact: cr.Contact) -> None:
     half = 0.5 * contact.loads
     assert cr.verify(paper(), contact.loads, approach=PAPER_APPROACH)
     assert not cr.verify(paper(), half, approach=PAPER_APPROACH)
@@ -112,8 +116,7 @@ def test_wrong_loads_do_not_pass_as_true() -> None:
     assert said.startswith("the loads err by up to")
 
 
-def test_totals_in_another_unit() -> None:
-    contact = cr.press(paper(), approach=PAPER_APPROACH)
+def test_totals_in_another_unit(contact: cr.Contact) -> None:
     verdict = cr.verify(paper(), 1e3 * contact.loads, load=contact.load)
     assert verdict.certificate.all_proved  # the set is right
     assert not verdict.total_holds
@@ -182,9 +185,8 @@ def test_exchanged_coordinates_of_a_square_array(moved: Any, said: str) -> None:
 
 
 @pytest.mark.parametrize("factor", [0.9, 0.98, 1.02, 3.0, 1000.0])
-def test_a_common_factor_makes_no_suspects(factor: float) -> None:
+def test_a_common_factor_makes_no_suspects(contact: cr.Contact, factor: float) -> None:
     """All loads are equally wrong, so differences of rounding size say nothing."""
-    contact = cr.press(paper(), approach=PAPER_APPROACH)
     verdict = cr.verify(contact.scene, contact.loads * factor, approach=PAPER_APPROACH)
     assert not verdict.holds
     assert len(verdict.suspects) == 0
@@ -201,11 +203,6 @@ def test_exact_numbers_of_python_are_accepted(kind: Any) -> None:
 
 
 PAGE = Path(__file__).parent.parent / "docs" / "how-to" / "test-your-solver.md"
-
-
-@pytest.fixture(scope="module")
-def contact() -> cr.Contact:
-    return cr.press(paper(), approach=PAPER_APPROACH)
 
 
 def failure(call: Any, *arguments: Any, **options: Any) -> str:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from friction_scenes import FRICTION, KINDS, pressed
+from friction_scenes import FRICTION, KINDS, PAPER, pressed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from levels_reference import Bristles
@@ -184,10 +184,6 @@ def test_slip_against_friction_costs_the_energy(high: float, low: float) -> None
     assert_array_equal(found.losses, cycle.asperity_losses)
 
 
-F = 0.5
-PAPER = replace(NAMED["paper"][0], friction=F)
-
-
 def rough(count: int, *, tips: float = 0.0, geometry: Any = "summit") -> list[cr.Scene]:
     flat, spread = PAPER.asperities, {"height_std": 1e-6, "tip_radius_cv": tips}
     sampled = [flat.roughened(**spread, seed=k) for k in range(count)]
@@ -197,7 +193,7 @@ def rough(count: int, *, tips: float = 0.0, geometry: Any = "summit") -> list[cr
 def scattered(count: int) -> list[cr.Scene]:
     rng, grid = np.random.default_rng(5), 0.0026 * (np.indices((9, 9)).reshape(2, -1).T - 4)
     places = [grid + rng.uniform(-2e-4, 2e-4, grid.shape) for _ in range(count)]
-    return [on_sphere(each, friction=F) for each in places]
+    return [on_sphere(each, friction=FRICTION) for each in places]
 
 
 BASES: list[Any] = [1.0, 2.0, (1.0, 1.5)]
@@ -258,7 +254,7 @@ def test_what_rows_do_not_prove_is_done_one_by_one(monkeypatch: pytest.MonkeyPat
     scenes = rough(3)
     lifted = cr.press_many(scenes, approach=[-1.0, 5e-5, 5e-5])
     assert_same(lifted, 0, cr.press(scenes[0], approach=-1.0))
-    limits = F * lifted.loads
+    limits = FRICTION * lifted.loads
     ends = lifted.cycles(limits * np.array([0.0, 1.0, 0.0]))  # nothing, gross sliding, no range
     for k in range(3):
         assert ends.losses[k] == ends[k].loss

@@ -19,7 +19,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from multiprecision import exact, inverse_sum, inverse_sums, middle, of_scene, pulled, quotient
 from scenes import (
-    BASES,
+    LATTICES,
     LAYOUTS,
     jittered,
     lattice_operator,
@@ -63,7 +63,7 @@ EVEN = ("disc", "jittered")
 def operator(kind: str, layout: str, rng: np.random.Generator, count: int = 0) -> Any:
     if kind == "lattice":
         count = count or int(rng.choice([40, 500, 1000]))
-        points = lattice_patch(turned(BASES[layout], 0.3), count)
+        points = lattice_patch(turned(LATTICES[layout], 0.3), count)
         return lattice_operator(points + rng.choice([0.0, 300.0, 1e6]), SCALE)
     points = LAYOUTS[layout](rng)
     if kind == "dense":  # more than 64 points are summed in blocks
@@ -73,7 +73,7 @@ def operator(kind: str, layout: str, rng: np.random.Generator, count: int = 0) -
 
 CASES = [
     *(("dense", layout) for layout in ("disc", "coincident")),
-    *(("lattice", basis) for basis in BASES),
+    *(("lattice", basis) for basis in LATTICES),
     *(("scattered", layout) for layout in LAYOUTS),
 ]
 each_operator = pytest.mark.parametrize(("kind", "layout"), CASES)
@@ -220,7 +220,7 @@ def test_threads_that_restrict_one_operator_at_once_get_their_own() -> None:
 
 
 def test_threads_whose_loads_reach_unequally_far_get_their_own_sums() -> None:
-    points = lattice_patch(turned(BASES["square"], 0.3), 60)
+    points = lattice_patch(turned(LATTICES["square"], 0.3), 60)
     near, everywhere = Pair.exact(np.eye(60)[0]), Pair.exact(np.ones(60))
     true = lattice_operator(points, SCALE).sums(near)
     for found in interrupted(points, LatticeInfluence.sums, near, everywhere, first=near):
@@ -248,7 +248,7 @@ def test_slopes(kind: str, layout: str, seed: int) -> None:
     for load in loadings(len(A), rng):
         off, errors = off_and_errors(A, load, rows)
         top = (SCALE * A.falloff(np.abs(load), 2)).max()
-        assert off.max() <= 1e-10 * top or layout not in (*EVEN, *BASES)
+        assert off.max() <= 1e-10 * top or layout not in (*EVEN, *LATTICES)
         limit = {"lattice": 1e-11 * max(1.0, 1e-3 * shift), "dense": 1e-12}.get(kind, np.inf)
         assert errors.max() <= limit * top or layout == "coincident"
 
@@ -305,9 +305,9 @@ def test_many_points_of_a_lattice_are_exactly_on_their_sites(family: str, geomet
             assert abs(float(off)) <= found.radius[i] <= 1e-21 * found.mid.high[i]
 
 
-@pytest.mark.parametrize("name", BASES)
+@pytest.mark.parametrize("name", LATTICES)
 def test_what_is_nearly_a_lattice_is_none(name: str) -> None:
-    points = lattice_patch(np.array(BASES[name]), 500)
+    points = lattice_patch(np.array(LATTICES[name]), 500)
     assert Lattice.through(points) is not None
     noise = 1e-9 * np.random.default_rng(2).standard_normal(points.shape)
     for moved in (slice(None), 0, 100, 499):
@@ -322,7 +322,7 @@ def test_what_is_nearly_a_lattice_is_none(name: str) -> None:
 def test_shells_do_not_overlap(seed: int) -> None:
     """The premise of the shell lemma: s_i + s_j <= r_ij for all pairs, touching or not."""
     rng = np.random.default_rng(seed)
-    points = lattice_patch(turned(BASES[sorted(BASES)[seed % 4]], 0.2), 300)
+    points = lattice_patch(turned(LATTICES[sorted(LATTICES)[seed % 4]], 0.2), 300)
     points = rng.permutation(points)[:120] + rng.choice([0.0, 1e6])
     touching = rng.random(120) < rng.random() ** 3
     radii = rng.lognormal(0, rng.choice([0.0, 0.0, 3.0]), 120) * touching
@@ -339,7 +339,7 @@ def test_shells_do_not_overlap(seed: int) -> None:
 def test_the_most_crowded_pair(basis: str) -> None:
     """Also if it is not one of nearest neighbours, at the ends of rows, and if none touches."""
     rng = np.random.default_rng(1)
-    points = np.indices((6, 7)).reshape(2, -1).T @ np.array(BASES[basis])
+    points = np.indices((6, 7)).reshape(2, -1).T @ np.array(LATTICES[basis])
     A, mesh = lattice_operator(points, SCALE), ScatteredInfluence(points, SCALE)
     dense = DenseInfluence.assemble(points, SCALE)
     for coverage in np.linspace(0.0, 0.2, 150):

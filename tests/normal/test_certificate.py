@@ -14,6 +14,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scenes import (
     CASES,
+    EVERY,
     MATERIAL,
     NAMED,
     OPERATORS,
@@ -52,11 +53,11 @@ from convexrough.normal.refine import trial
 from convexrough.solvers import Newton
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("kind", ATTACKS)
 @pytest.mark.parametrize(("name", "operator"), CASES)
 def test_attacks_on_known_scenes(name: str, operator: Kind, kind: str) -> None:
-    scene, approach = NAMED[name]
+    scene, approach = EVERY[name]
     exact = reference(scene, approach=approach)
     contact = cr.press(scene, approach=approach)
     for seed in range(3):

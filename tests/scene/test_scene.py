@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from multiprecision import false_claims, off
+from multiprecision import false_claims
 from numpy.testing import assert_allclose
-from scenes import MATERIAL, paper, rough, solve_exactly, stepped
-from status_audit import assert_honest
+from scenes import BASES, MATERIAL, paper, rough, stepped
 
 import convexrough as cr
 from convexrough import checker
@@ -87,29 +86,15 @@ def test_random_heights_and_radii() -> None:
 
 
 INF = float("inf")
-BASES: dict[str, Any] = {"flat": INF, "ellipsoid": (1.0, 2.5), "cylinder": (INF, 0.8)}
 GEOMETRIES = ("summit", "closest")
 
-each_base = pytest.mark.parametrize("base", BASES.values(), ids=BASES.keys())
+each_base = pytest.mark.parametrize("base", [R for R, _ in BASES.values()], ids=BASES)
 each_geometry = pytest.mark.parametrize("geometry", GEOMETRIES)
 
 
 def on(base: Any, geometry: Any = "summit", friction: float = 0.5) -> cr.Scene:
     """91 asperities with random heights and tip radii."""
     return replace(rough(geometry), sphere_radius=base, friction=friction)
-
-
-@pytest.mark.sample(4)
-@each_base
-@each_geometry
-@pytest.mark.parametrize("control", [{"approach": 4e-5}, {"load": 3e-7}])
-def test_loads_are_those_to_50_digits(base: Any, geometry: Any, control: Any) -> None:
-    scene = on(base, geometry)
-    contact = cr.press(scene, **control)
-    exact = solve_exactly(scene, start=contact.loads, **control)
-    assert contact.certificate.scope == "global"
-    assert_honest(contact.certificate, contact.loads, exact)
-    assert off(contact.loads, exact.loads).max() <= 1e-13 * contact.loads.max()
 
 
 @pytest.mark.sample(2)
