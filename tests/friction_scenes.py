@@ -5,7 +5,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from scenes import MATERIAL, NAMED, hexagonal
+from scenes import EVERY, MATERIAL, hexagonal
 
 import convexrough as cr
 from convexrough import FrictionConic, VectorShearState, shear_vector
@@ -51,7 +51,7 @@ def with_friction(scene: cr.Scene, friction: float = FRICTION, nu: float = 0.3) 
 
 
 #: name -> (scene, approach), with friction; "dense" has the crowding 0.88.
-SCENES = {name: (with_friction(scene), approach) for name, (scene, approach) in NAMED.items()}
+SCENES = {name: (with_friction(scene), approach) for name, (scene, approach) in EVERY.items()}
 SCENES["dense"] = (with_friction(hexagonal(tip_radius=0.07, height_std=1e-6, seed=3)), 5e-5)
 PAPER = SCENES["paper"][0]
 

@@ -54,9 +54,10 @@ class Setup:
         prescribed = contact.prescribed_load
         load = contact.load if prescribed is None else prescribed
         control = load if holding == "load" else contact.approach
-        numbers = scene.sphere_radius, material.contact_modulus, material.poisson_ratio
+        numbers = material.contact_modulus, material.poisson_ratio
         return cls(
             *map(exact, (a.positions, a.tip_radii, a.heights)),
+            exact(np.array(scene.sphere_radius, dtype=float))[()],
             *(arb(float(value)) for value in (*numbers, scene.friction or 1.0, control)),
             exact(np.asarray(forces, dtype=float)) if np.size(forces) else np.zeros(0, object),
             scene.geometry,
@@ -75,9 +76,9 @@ class Oracle:
 
     def __init__(self, setup: Setup, start: "cr.Contact | Oracle") -> None:
         s = self.setup = setup
-        bends, modulus = np.array([1 / s.sphere_radius] * 2), s.contact_modulus
+        self.bends, modulus = exact(np.zeros(2)) + 1 / s.sphere_radius, s.contact_modulus
         points, self.offsets, law = assemble(
-            s.positions, s.tip_radii, s.heights, bends, modulus, s.geometry
+            s.positions, s.tip_radii, s.heights, self.bends, modulus, s.geometry
         )
         self.A, loads = coupling(points, modulus), exact(start.loads)
         on = self.touching = np.flatnonzero([bool(load > 0) for load in loads])
@@ -137,7 +138,7 @@ class Friction:
         self.loads = pressed.loads
         found = slide(s.friction, s.poisson_ratio, pressed, held)
         self.forces, self.slips, self.displacement, self.energies, self.energy = found
-        relative = 1 / (1 / s.sphere_radius + 1 / s.tip_radii)
+        relative = 1 / (held.bends.sum() / 2 + 1 / s.tip_radii)
         self.stick_radii = cube_root(3 * held.loads * relative / (4 * s.contact_modulus))
         self.sticks = np.array([bool(load > 0) for load in held.loads])
 
@@ -207,7 +208,7 @@ def assert_slopes(
 ) -> None:
     """Every derivative within its bound of differences, arrays along random signs."""
     rng = np.random.default_rng(seed)
-    names = NAMES if gradient.friction is not None else NAMES[:-1]
+    names = (name for name in NAMES if getattr(gradient, name) is not None)
     for name in (*names, *more):
         slopes, errors = known(gradient, gradient.holding if name == "control" else name)
         v = rng.choice([-1.0, 1.0], size=slopes.shape)

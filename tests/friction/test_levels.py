@@ -47,7 +47,7 @@ CASES = {*product(SCENES, ["dense"], ["approach", "load"], [1e-3, 0.37, 0.999])}
 CASES |= {*product(NAMES, KINDS, ["approach"], FRACTIONS)}
 
 
-@pytest.mark.sample(11)
+@pytest.mark.sample(13)
 @pytest.mark.parametrize(("name", "influence", "holding", "fraction"), sorted(CASES))
 def test_states_and_cycles(name: str, influence: str, holding: str, fraction: float) -> None:
     """Every force to 1e-11 of itself, too."""

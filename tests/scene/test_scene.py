@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from scenes import BASES, MATERIAL, paper, rough, stepped
+from scenes import MATERIAL, paper
 
 import convexrough as cr
 from convexrough.normal.problem import NormalProblem
@@ -86,14 +86,6 @@ def test_random_heights_and_radii() -> None:
 INF = float("inf")
 GEOMETRIES = ("summit", "closest")
 
-each_base = pytest.mark.parametrize("base", [R for R, _ in BASES.values()], ids=BASES)
-each_geometry = pytest.mark.parametrize("geometry", GEOMETRIES)
-
-
-def on(base: Any, geometry: Any = "summit", friction: float = 0.5) -> cr.Scene:
-    """91 asperities with random heights and tip radii."""
-    return replace(rough(geometry), sphere_radius=base, friction=friction)
-
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("within", [0.03, 0.12])  # by one start of Newton's method and the other
@@ -126,30 +118,3 @@ def test_reach(geometry: Any) -> None:
         assert np.sign(1e-4 + scene.offsets[0]) == sign
     assert reach(1e-4, sphere_radius=INF, **given) == INF
     assert reach(-1e-4, sphere_radius=(1.0, INF), **given) == 0
-
-
-@pytest.mark.sample(2)
-@each_base
-@each_geometry
-def test_gradients(base: Any, geometry: Any) -> None:
-    """By heights, tips and positions against differences; forwards the same."""
-    scene, random, step = on(base, geometry), np.random.default_rng(4), 1e-4
-    sizes = {"heights": 1e-6, "tip_radii": 1e-2, "positions": 1e-4}
-    steps = {
-        name: size * random.standard_normal(getattr(scene.asperities, name).shape)
-        for name, size in sizes.items()
-    }
-
-    def loss(t: float) -> Any:
-        contact = cr.press(stepped(scene, t, steps), load=3e-7)
-        return contact, cr.cycle(contact, maximum=3e-8)
-
-    contact, cycle = loss(0.0)
-    gradient = cycle.gradient()
-    slope = sum((getattr(gradient, name) * each).sum() for name, each in steps.items())
-    (above, top), (below, bottom) = loss(step), loss(-step)
-    assert slope == pytest.approx((top.loss - bottom.loss) / (2 * step), rel=1e-4)
-    forwards = contact.change(cr.Direction(**steps)).approach
-    assert forwards == pytest.approx((above.approach - below.approach) / (2 * step), rel=1e-5)
-    assert gradient.sphere_radius is None
-    assert np.isfinite(gradient.height_errors).all()
