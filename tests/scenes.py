@@ -76,13 +76,6 @@ def complementary_energy(contact: cr.Contact) -> float:
         return float(multiprecision.energy(contact.scene, loads, arb(0)))
 
 
-def stepped(scene: cr.Scene, by: float, steps: dict[str, Any]) -> cr.Scene:
-    """With asperities changed by so many times these steps of their heights and so on."""
-    a = scene.asperities
-    moved = {name: getattr(a, name) + by * step for name, step in steps.items()}
-    return replace(scene, asperities=replace(a, **moved))
-
-
 def scaled(scene: cr.Scene, length: float, modulus: float) -> cr.Scene:
     """In other units: lengths times `length`, moduli times `modulus`."""
     a, material = scene.asperities, scene.material
