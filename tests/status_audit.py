@@ -13,13 +13,13 @@ from typing import Any
 import multiprecision
 import numpy as np
 from flint import arb, ctx
+from friction_scenes import FRICTION, with_friction
 from multiprecision import Friction, slide, solve_vectors, travel_of
 from scenes import on_lattice, on_sphere, operators, scaled, scattered, solve_exactly
 
 import convexrough as cr
 from convexrough.arrays import Array
 
-FRICTION = 0.5
 DIGITS = 60  # of the exact states, whose differences lose some where Q is small
 BITS = 4096  # nothing is rounded in a comparison
 
@@ -322,9 +322,7 @@ def audit_vectors(kind: str, tilted: cr.Contact, full: Any, pair: Any, tally: Ta
 
 def _with_poisson(contact: cr.Contact, nu: float) -> cr.Contact:
     """At nu = 0 the tensor is the scalar kernel, and the theorem holds for vectors along x."""
-    scene = contact.scene
-    material = cr.Material(scene.material.contact_modulus, nu)
-    return replace(contact, scene=replace(scene, material=material))
+    return replace(contact, scene=with_friction(contact.scene, nu=nu))
 
 
 def report(tally: Tally) -> str:
