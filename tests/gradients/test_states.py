@@ -321,7 +321,7 @@ def assert_both(
                 assert_close(true, *parts, name, sharp if v is signs else 0.0)
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("fraction", [1e-2, 0.4, 0.999])
 @pytest.mark.parametrize("holding", ["load", "approach"])
@@ -453,7 +453,7 @@ CHANGED = ["pressed.loads", "pressed.gaps", "pressed.load", "pressed.approach"]
 CHANGED += ["forces", "slips", "displacement"]
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(("name", "holding", "fraction"), CASES)
 def test_everything_that_changes(name: str, holding: str, fraction: float) -> None:
     contact = pressed(name, control=holding)
