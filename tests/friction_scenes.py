@@ -1,19 +1,18 @@
-"""Pressed scenes with friction, and their states by definition, that the tests of shear share."""
+"""Scenes with friction, pressed and along load paths, that the tests of shear share."""
 
 from dataclasses import replace
 from functools import cache
 from typing import Any
 
 import numpy as np
-from flint import arb, ctx
-from scenes import NAMED, hexagonal
+from scenes import EVERY, MATERIAL, hexagonal
 
 import convexrough as cr
 from convexrough import FrictionConic, VectorShearState, shear_vector
+from convexrough.arrays import Array
 from convexrough.sphere import hertz
 
 FRICTION = 0.5
-DIGITS = 80
 FRACTIONS = [1e-9, 1e-6, 1e-3, 0.1, 0.35, 0.37, 0.5, 0.7, 0.9, 0.999]
 NAMES = ["paper", "rough"]
 KINDS = ["dense", "lattice"]
@@ -52,15 +51,47 @@ def with_friction(scene: cr.Scene, friction: float = FRICTION, nu: float = 0.3) 
 
 
 #: name -> (scene, approach), with friction; "dense" has the crowding 0.88.
-SCENES = {name: (with_friction(scene), approach) for name, (scene, approach) in NAMED.items()}
+SCENES = {name: (with_friction(scene), approach) for name, (scene, approach) in EVERY.items()}
 SCENES["dense"] = (with_friction(hexagonal(tip_radius=0.07, height_std=1e-6, seed=3)), 5e-5)
+PAPER = SCENES["paper"][0]
+
+#: The two scenes of the load paths: the largest loads; (P, T) over these.
+LARGEST = {"paper": 3.6085338874666633e-07, "rough": 3.541076216864549e-07}
+ONE = [(0.6, 0), (0.6, 0.3), (1, 0.3), (1, -0.15), (0.7, -0.15), (0.7, 0.2), (0.5, 0.1)]
+TWO = [(1, 0.5), (0.3, -0.2), (0.9, 0.35), (0.9, -0.6), (0.05, 0), (0.8, 0.6)]
 
 
-def off(values: Any, true: Any) -> np.ndarray:
-    """(m,) upper bounds on |values - true|."""
-    both = zip(np.atleast_1d(values), np.atleast_1d(true), strict=True)
-    with ctx.workdps(DIGITS):
-        return np.array([float(abs(arb(float(value)) - it).upper()) for value, it in both])
+def path_of(name: str, points: Any) -> tuple[cr.Scene, Array, Array]:
+    """The scene, and P and Q of these points."""
+    P, T = np.array(points).T * LARGEST[name]
+    return SCENES[name][0], P, 0.5 * T
+
+
+def follow(name: str, points: list[tuple[float, float]]) -> cr.LoadPath:
+    scene, loads, forces = path_of(name, points)
+    return cr.load_path(scene, loads=loads, forces=forces)
+
+
+def on_flat(points: Any, tip_radii: Any, heights: Any) -> cr.Scene:
+    """Asperities under a sphere so large that it is flat where they are, with friction."""
+    asperities = cr.Asperities(points, tip_radii, heights)
+    return cr.Scene(1e6, asperities, MATERIAL, friction=0.5, geometry="summit")
+
+
+def ring(count: int) -> Array:
+    """So many points around one, at the distance 1."""
+    turn = 2 * np.pi * np.arange(count) / count
+    return np.vstack(([0.0, 0.0], np.column_stack((np.cos(turn), np.sin(turn)))))
+
+
+def around(load: float) -> cr.Contact:
+    """Three equal contacts around a shorter one, so crowded that they lift it out again."""
+    return cr.press(on_flat(ring(3), 1.0, [-0.05, 0.0, 0.0, 0.0]), load=load)
+
+
+def shaded() -> cr.Scene:
+    """A small low asperity between five crowded ones: pressed far, it loses load again."""
+    return on_flat(ring(5), np.r_[0.05, np.ones(5)], np.r_[-0.06, np.zeros(5)])
 
 
 @cache

@@ -27,7 +27,7 @@ import numpy as np
 import psutil
 import pyarrow
 from pyarrow import parquet
-from scene_files import EVERYTHING, FRICTION, LOAD, STAGES, scene_text
+from scene_files import EVERYTHING, FRICTION, LOAD, STAGES, lines, scene_text
 
 import convexrough as cr
 from convexrough import cli
@@ -113,9 +113,7 @@ def _run(rng: random.Random) -> list[str]:
 
 
 def _text(rng: random.Random, table: str) -> bytes:
-    separator, columns = rng.choice([",", ";", "\t", " "]), TABLES[table]
-    rows = [columns, *zip(*columns.values(), strict=True)]
-    return ("\n".join(separator.join(map(str, row)) for row in rows) + "\n").encode()
+    return lines(TABLES[table], rng.choice([",", ";", "\t", " "])).encode()
 
 
 def _array_file(rng: random.Random, table: str, form: str) -> bytes:

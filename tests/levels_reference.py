@@ -1,63 +1,155 @@
-"""Normal solutions at any load in 130 digits and all that friction makes of them: the reference.
+"""Contacts, what friction makes of them, and derivatives, in 130 digits: the reference.
 
-Two levels make friction states by `multiprecision.slide`; where order fails `Bristles` follow.
+By the formulas of physics alone; those that touch are taken from float64 and may not change. Two
+levels make friction states by `multiprecision.slide`; where order fails `Bristles` follow.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
 import numpy as np
 from flint import arb, ctx
 from friction_scenes import FRICTION, pressed
-from gradient_oracle import DIGITS, Balls, Judge, Oracle, Setup, exact, press
-from multiprecision import cube_root, slide, travel_of
+from multiprecision import (
+    Balls,
+    NormalMap,
+    assemble,
+    coupling,
+    cube_root,
+    exact,
+    mid,
+    slide,
+    solve_linear,
+    travel_of,
+)
 
 import convexrough as cr
 from convexrough.arrays import Array
 
+DIGITS = 130
+STEP = "1e-25"  # of each parameter over its own size
 
-class Level(Oracle):
-    """The normal solution of a setup; who touches is taken from float64 and then proved by signs.
 
-    start : a contact of the same scene, pressed nearly as the setup asks; or a level
+@dataclass(frozen=True)
+class Setup:
+    """Everything a result depends on; `control` is P or D0, `forces` are shear forces."""
+
+    positions: Balls
+    tip_radii: Balls
+    heights: Balls
+    sphere_radius: Balls
+    contact_modulus: Balls
+    poisson_ratio: Balls
+    friction: Balls
+    control: Balls
+    forces: Balls
+    geometry: str
+    by_load: bool
+
+    @classmethod
+    def of(cls, contact: cr.Contact, holding: str, forces: Any = ()) -> "Setup":
+        scene, a, material = contact.scene, contact.scene.asperities, contact.scene.material
+        prescribed = contact.prescribed_load
+        load = contact.load if prescribed is None else prescribed
+        control = load if holding == "load" else contact.approach
+        numbers = material.contact_modulus, material.poisson_ratio
+        return cls(
+            *map(exact, (a.positions, a.tip_radii, a.heights)),
+            exact(np.array(scene.sphere_radius, dtype=float))[()],
+            *(arb(float(value)) for value in (*numbers, scene.friction or 1.0, control)),
+            exact(np.asarray(forces, dtype=float)) if np.size(forces) else np.zeros(0, object),
+            scene.geometry,
+            holding == "load",
+        )
+
+    def moved(self, **by: Balls) -> "Setup":
+        return replace(self, **{name: getattr(self, name) + each for name, each in by.items()})
+
+
+class Oracle:
+    """The state of a setup, by Newton's steps from one near it, and not proved.
+
+    start : a contact of the same scene, pressed nearly as the setup asks; or another oracle
     """
 
-    def __init__(self, setup: Setup, start: "cr.Contact | Level") -> None:
-        if isinstance(start, Level):
-            super().__init__(setup, start.loads, start.approach, 3)
-        else:
-            super().__init__(setup, exact(start.loads), arb(start.approach), 7)
-        assert all(load > 0 for load in self.P)
-        assert all(gap > 0 for gap in np.delete(self.gaps, self.touching))
-        on = self.touching
+    def __init__(self, setup: Setup, start: "cr.Contact | Oracle") -> None:
+        s = self.setup = setup
+        self.bends, modulus = exact(np.zeros(2)) + 1 / s.sphere_radius, s.contact_modulus
+        points, self.offsets, law = assemble(
+            s.positions, s.tip_radii, s.heights, self.bends, modulus, s.geometry
+        )
+        self.A, loads = coupling(points, modulus), exact(start.loads)
+        on = self.touching = np.flatnonzero([bool(load > 0) for load in loads])
+        self.inner = self.A[np.ix_(on, on)]
+        problem = NormalMap(self.inner, law[on], self.offsets[on], s.control, s.by_load, arb(1))
+        x = mid(np.append(law[on] * cube_root(loads[on]) ** 2, arb(start.approach)))
+        for _ in range(3 if isinstance(start, Oracle) else 7):
+            x = mid(x - solve_linear(problem.jacobian(x), problem.residual(x), "approx"))
+        defect = max(abs(problem.residual(x)[:-1]), default=arb(0))
+        assert defect < abs(x[-1]) * arb(10) ** (15 - DIGITS)
+        self.P, self.approach = problem.loads(x), x[-1]
         self.load = self.P.sum() if len(self.P) else arb(0)
-        own = 3 * self.thresholds[on] / 5 + self.inner @ self.P / 2 - self.offsets[on]
-        self.energy = own @ self.P  # V(L)
+        self.loads, self.thresholds = (np.full(len(law), arb(0)) for _ in range(2))
+        self.loads[on], self.thresholds[on] = self.P, x[:-1]
+        self.gaps = self.A @ self.loads - self.offsets - self.approach
+        self.gaps[on] = arb(0)
+
+    @property
+    def energy(self) -> Balls:
+        """V(L)."""
+        own = 3 * self.thresholds / 5 + self.A @ self.loads / 2 - self.offsets
+        return own @ self.loads
+
+
+def level(setup: Setup, start: cr.Contact | Oracle) -> Oracle:
+    """The normal solution; who touches is proved by signs."""
+    found = Oracle(setup, start)
+    assert all(load > 0 for load in found.P)
+    assert all(gap > 0 for gap in np.delete(found.gaps, found.touching))
+    return found
+
+
+class Judge:
+    """Derivatives of numbers by differences of them: value(setup, near) -> (numbers, state)."""
+
+    def __init__(self, setup: Setup, value: Callable[[Setup, Any], tuple[Balls, Any]]) -> None:
+        self.setup, self.value = setup, value
+        with ctx.workdps(DIGITS):
+            self.at, self.near = value(setup, None)
+
+    def difference(self, name: str, direction: Balls) -> Balls:
+        """The derivative along `direction` of one parameter, to 100 digits."""
+        with ctx.workdps(DIGITS):
+            size = np.abs(np.atleast_1d(getattr(self.setup, name))).max()
+            h = arb(STEP) * (size if size > 0 else 1)
+            there = (self.setup.moved(**{name: s * h * direction}) for s in (1, -1))
+            up, down = (self.value(each, self.near)[0] for each in there)
+            return mid((up - down) / (2 * h))[()]
 
 
 class Friction:
     """A friction state under the force Q = f T, and the cycle between +-Q, by two levels."""
 
-    def __init__(self, pressed: Level, held: Level, T: Balls) -> None:
+    def __init__(self, pressed: Oracle, held: Oracle, T: Balls) -> None:
         s = held.setup
         self.pressed, self.held, self.T, self.f = pressed, held, T, s.friction
         self.loads = pressed.loads
         found = slide(s.friction, s.poisson_ratio, pressed, held)
         self.forces, self.slips, self.displacement, self.energies, self.energy = found
-        relative = 1 / (1 / s.sphere_radius + 1 / s.tip_radii)
+        relative = 1 / (held.bends.sum() / 2 + 1 / s.tip_radii)
         self.stick_radii = cube_root(3 * held.loads * relative / (4 * s.contact_modulus))
         self.sticks = np.array([bool(load > 0) for load in held.loads])
 
 
 def of_setup(setup: Setup, contact: cr.Contact, near: Friction | None = None) -> Friction:
     """A state under a shear force below f P; near : one of nearly the same setup."""
-    upper = Level(setup, near.pressed if near else contact)
+    upper = level(setup, near.pressed if near else contact)
     T = setup.forces[0] / setup.friction
     left = (upper.load - T).mid()
     start = near.held if near else cr.press(contact.scene, load=float(left))
-    return Friction(upper, Level(replace(setup, control=left, by_load=True), start), T)
+    return Friction(upper, level(replace(setup, control=left, by_load=True), start), T)
 
 
 def judge_of(
@@ -66,7 +158,7 @@ def judge_of(
     """Of numbers of the contact, or of its state under a shear force."""
 
     def value(setup: Setup, near: Any) -> tuple[Any, Any]:
-        make = of_setup(setup, contact, near) if force else press(contact, setup, near)
+        make = of_setup(setup, contact, near) if force else Oracle(setup, near or contact)
         return number(make), make
 
     return Judge(Setup.of(contact, holding, force), value)
@@ -79,11 +171,11 @@ def loss_and_displacement(state: Friction) -> Balls:
 def displaced(contact: cr.Contact, displacement: float, holding: str) -> Friction:
     """Moved by X [length]: the level at the approach D0(P) - X / (c_t f)."""
     with ctx.workdps(DIGITS):
-        upper = Level(Setup.of(contact, holding), contact)
+        upper = level(Setup.of(contact, holding), contact)
         travel = travel_of(upper.setup.friction, upper.setup.poisson_ratio)
         left = (upper.approach - arb(displacement) / travel).mid()
         start = cr.press(contact.scene, approach=float(left))
-        lower = Level(replace(upper.setup, control=left, by_load=False), start)
+        lower = level(replace(upper.setup, control=left, by_load=False), start)
         return Friction(upper, lower, upper.load - lower.load)
 
 
@@ -94,6 +186,43 @@ def reference(name: str, fraction: float, holding: str = "approach") -> Friction
     with ctx.workdps(DIGITS):
         setup = Setup.of(contact, holding, [fraction * FRICTION * contact.load])
         return of_setup(setup, contact)
+
+
+#: What everything depends on; friction is the last.
+NAMES = ("heights", "tip_radii", "positions", "sphere_radius", "contact_modulus",
+            "poisson_ratio", "friction")  # fmt: skip
+
+#: Names of the bounds on derivatives.
+ERRORS = {"heights": "height_errors", "tip_radii": "tip_radius_errors"}
+ERRORS |= {"positions": "position_errors", "forces": "force_errors", "loads": "load_errors"}
+
+
+def known(gradient: cr.Gradient, name: str) -> tuple[Array, Array]:
+    """A derivative and its bound."""
+    error = ERRORS.get(name, f"{name}_error")
+    return np.asarray(getattr(gradient, name)), np.asarray(getattr(gradient, error))
+
+
+def assert_slopes(
+    judge: Judge, gradient: cr.Gradient, *more: str, seed: int = 0, sharp: float = 0.0
+) -> None:
+    """Every derivative within its bound of differences, arrays along random signs."""
+    rng = np.random.default_rng(seed)
+    names = (name for name in NAMES if getattr(gradient, name) is not None)
+    for name in (*names, *more):
+        slopes, errors = known(gradient, gradient.holding if name == "control" else name)
+        v = rng.choice([-1.0, 1.0], size=slopes.shape)
+        assert_close(judge.difference(name, exact(v)[()]), slopes * v, errors, name, sharp)
+
+
+def assert_close(true: Balls, terms: Any, errors: Any, name: str, sharp: float = 0.0) -> None:
+    """A difference, and terms whose sum it is within their errors."""
+    with ctx.workdps(DIGITS):
+        off = float(abs(exact(terms).sum() - true))
+    # The difference itself has some 20 digits.
+    assert off <= errors.sum() + 1e-18 * abs(float(true)), (name, off, errors.sum(), float(true))
+    if sharp:
+        assert errors.max() <= sharp * np.abs(terms).max() + 1e-200, name
 
 
 class Bristles:

@@ -12,29 +12,45 @@ is solved as its *normal map* F = 0, one equation for each asperity and one for 
 whose solution has delta_i > 0 (the indentation) where asperities touch and delta_i < 0 (minus
 the gap) where they do not. Damped Newton finds the point; one interval Newton step, in ball
 arithmetic, proves it. The oracle shares no code with the package that it judges.
+
+`solve_vectors` does the same for friction states with the full tangential kernel. Loads P_i > 0 are
+given as balls. Forces over f and displacements over c_t f, with bias = nu / (2 - nu) and d the unit
+vector between two asperities, solve
+
+    F = ( eta_i + sum_j A_ij [(1 - bias) I + 2 bias d d'] q_j - X,    sum_j q_j - T ) = 0,
+
+where q_i is along eta_i and of the length P_i [1 - (1 - min(|eta_i| / kappa_i, 1))^(3/2)]: what an
+asperity must take up, its slip included, is eta (docs/theory/vector-friction.md, "Newton's
+method"). The state is the only one where the energy is convex, which is not tested here.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import inf, log2
+from types import SimpleNamespace
 from typing import Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from flint import arb, arb_mat, ctx
 from numpy.typing import ArrayLike, NDArray
 
+Array: TypeAlias = NDArray[np.float64]
 Balls: TypeAlias = Any  # an arb, or an object array of arb: no dtype of numpy can say so
 
 GUARD_DIGITS = 30  # carried beyond the digits promised
 NEWTON_STEPS, HALVINGS = 200, 40  # generous: about ten steps are usual
-EXACT_BITS = 4096  # precision of `errors`: float64 minus reference, with no error of its own
 ZERO: Balls = arb(0)
 ONE: Balls = arb(1)
 
 exact = np.vectorize(arb, otypes=[object])
 mid = np.vectorize(arb.mid, otypes=[object])
 cube_root = np.vectorize(lambda ball: ZERO if ball == 0 else ball.root(3), otypes=[object])
+
+
+def middle(ball: Any) -> Any:
+    """The middle of a ball of the package, or of each, at working precision."""
+    return exact(ball.mid.high) + exact(ball.mid.low)
 
 
 def quotient(x: Fraction) -> arb:
@@ -80,8 +96,6 @@ def solve(
     That it is the only one anywhere follows if the energy is convex, which is not tested here.
     Far from convex (overlapping contact discs) Newton may need a `start`, else raise NotProved.
     """
-    if (approach is None) == (load is None) or (load is not None and load <= 0):
-        raise ValueError("prescribe either the approach or a positive load")
     by_load = load is not None
     with ctx.workdps(digits + GUARD_DIGITS):
         control = arb(approach if load is None else load)
@@ -199,14 +213,31 @@ def prove(problem: Any, x: Balls, *, radius: arb) -> Balls:
     return inside
 
 
-def inverse_sum(points: Balls, loads: Balls, row: int) -> arb:
-    """sum_j P_j / r_ij over the others of points (n, 2)."""
-    total = ZERO
-    for j, load in enumerate(loads):
-        if j != row and load != 0:
-            x, y = points[row] - points[j]
-            total += load / (x * x + y * y).sqrt()
-    return total
+def inverse_sum(points: Balls, loads: Balls, target: Balls, power: int = 1) -> Balls:
+    """sum_j P_j / r_j^power over the points (n, 2) that are not the target; (n,) or (n, k) P."""
+    away = target - points
+    squares = (away * away).sum(axis=1)
+    apart = np.flatnonzero(squares != 0)
+    return np.array([square.rsqrt() ** power for square in squares[apart]]) @ loads[apart]
+
+
+def inverse_sums(
+    targets: Array, points: Array, loads: Array, scale: float = 1.0, power: int = 1
+) -> tuple[Array, Array]:
+    """`scale` times these sums of 160 bits, as pairs of float64 numbers."""
+    with ctx.workprec(160):
+        places, forces = exact(points), arb(scale) * exact(loads)
+        sums = [inverse_sum(places, forces, target, power) for target in exact(targets)]
+        high = np.array(sums).astype(float)
+        return high, (np.array(sums) - exact(high)).astype(float)
+
+
+def pulled(points: Array, loads: Array, i: int, scale: float) -> Balls:
+    """The derivatives of scale sum_j P_j / r_ij with respect to the coordinates of point i."""
+    with ctx.workprec(160):
+        places = exact(points)
+        along = exact(loads)[:, None] * (places[i] - places)
+        return -arb(scale) * inverse_sum(places, along, places[i], 3)
 
 
 def gaps(scene: Any, loads: Sequence[arb], approach: arb, rows: Iterable[int]) -> list[arb]:
@@ -228,17 +259,15 @@ def _terms(
     modulus = arb(float(scene.material.contact_modulus))
     points, shape, law = of_scene(scene)
     for i in rows:
-        sunk = inverse_sum(points, loads, i) / (arb.pi() * modulus)
+        sunk = inverse_sum(points, np.array(loads), points[i]) / (arb.pi() * modulus)
         yield loads[i], law[i] * cube_root(loads[i])[()] ** 2, sunk, shape[i]
 
 
-def errors(values: ArrayLike, reference: Sequence[arb] | arb) -> NDArray[np.float64]:
-    """values - reference, subtracted in multiprecision [the unit of both]."""
-    balls = [reference] if isinstance(reference, arb) else reference
-    with ctx.workprec(EXACT_BITS):
-        return np.array(
-            [float(v - r) for v, r in zip(np.atleast_1d(exact(values)), balls, strict=True)]
-        )
+def off(values: Any, true: Any) -> Array:
+    """(m,) upper bounds on |values - true|."""
+    both = zip(np.atleast_1d(values), np.atleast_1d(true), strict=True)
+    with ctx.workdps(80):
+        return np.array([float(abs(arb(float(value)) - it).upper()) for value, it in both])
 
 
 def travel_of(f: arb, nu: arb) -> arb:
@@ -294,8 +323,6 @@ def assemble(
     summits: Balls, tips: Balls, heights: Balls, bends: Balls, modulus: arb, geometry: str
 ) -> tuple[Balls, Balls, Balls]:
     """Where asperities touch, (n, 2) [length], d_i = D_i - D0 and k_i, both (n,)."""
-    if geometry not in ("summit", "closest"):
-        raise ValueError(f'the geometry is "summit" or "closest", not {geometry!r}')
     # r R / (R + rho), with 1 / R
     points = summits if geometry == "summit" else summits / (1 + tips[:, None] * bends)
     law = cube_root(9 / (16 * modulus * modulus) * (bends.sum() / 2 + 1 / tips))
@@ -307,8 +334,6 @@ def coupling(points: Balls, modulus: arb) -> Balls:
     offsets = points[:, None, :] - points[None, :, :]
     squares = (offsets * offsets).sum(axis=2)
     np.fill_diagonal(squares, ONE)
-    if not (squares > 0).all():
-        raise ValueError("two asperities are in one place")
     influence = 1 / (arb.pi() * modulus * np.sqrt(squares))
     np.fill_diagonal(influence, ZERO)
     return influence
@@ -329,3 +354,208 @@ def solve_linear(matrix: Balls, right: Balls, algorithm: Literal["approx"] | Non
         return np.array(solution)
     except ZeroDivisionError as error:
         raise NotProved("the Jacobian may be singular") from error
+
+
+# Friction with the full tangential kernel
+
+
+@dataclass(frozen=True)
+class VectorReference:
+    """A proved state of the loaded asperities; every ball contains the true value.
+
+    forces : (n, 2) over f [force];  slips : (n, 2) over c_t f [length]
+    displacement : (2,) X over c_t f [length]
+    sliding : (n,)
+    """
+
+    forces: Balls
+    slips: Balls
+    displacement: Balls
+    sliding: list[bool]
+
+
+@dataclass(frozen=True)
+class VectorMap:
+    """F and its derivative; the unknowns are eta_x, eta_y of each asperity, then X."""
+
+    loads: Balls
+    thresholds: Balls
+    kernel: Balls  # (2n, 2n)
+    total: Balls  # (2,) T
+    unit: Any  # a length over a force, so that every row of F is a length
+
+    def force(self, i: int, eta: Balls) -> tuple[Balls, Balls]:
+        """q_i (2,) and its derivative (2, 2)."""
+        length = (eta @ eta).sqrt()
+        if not length > 0:
+            raise NotProved("a displacement may be zero")
+        share = length / self.thresholds[i]
+        if share > 1:
+            size, slope = self.loads[i], arb(0)
+        elif share < 1:
+            root = (1 - share).sqrt()
+            size = self.loads[i] * (1 - root**3)
+            slope = arb(3) / 2 * self.loads[i] / self.thresholds[i] * root
+        else:
+            raise NotProved("an asperity slides or sticks, by less than its ball")
+        along = np.outer(eta, eta) / (length * length)
+        across = np.array([[arb(1), arb(0)], [arb(0), arb(1)]]) - along
+        return size / length * eta, slope * along + size / length * across
+
+    def forces(self, x: Balls) -> tuple[Balls, Balls]:
+        """q (n, 2) and their derivatives (n, 2, 2)."""
+        pairs = [self.force(i, eta) for i, eta in enumerate(x[:-2].reshape(-1, 2))]
+        q, slopes = (np.array(each) for each in zip(*pairs, strict=True))
+        return q, slopes
+
+    def residual(self, x: Balls) -> Balls:
+        q, n = self.forces(x)[0], len(self.loads)
+        moved = x[:-2] + self.kernel @ q.reshape(-1) - np.tile(x[-2:], n)
+        return np.append(moved, self.unit * (q.sum(axis=0) - self.total))
+
+    def jacobian(self, x: Balls) -> Balls:
+        n, slopes = len(self.loads), self.forces(x)[1]
+        stiff, together = np.full((2 * n, 2 * n), arb(0)), exact(np.tile(np.eye(2), (n, 1)))
+        for i, slope in enumerate(slopes):
+            stiff[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = slope
+        own = self.kernel @ stiff + exact(np.eye(2 * n))
+        balance = self.unit * (together.T @ stiff)
+        return np.block([[own, -together], [balance, np.full((2, 2), arb(0))]])
+
+
+def solve_vectors(
+    scene: Any, loads: list[Any], force: Any, start: Any, displacement: Any, digits: int = 50
+) -> VectorReference:
+    """The friction state of the asperities with loads > 0, under the force (2,), to `digits`.
+
+    start : (n, 2) forces [force] near the solution;  displacement : (2,) near it
+    """
+    with ctx.workdps(digits + GUARD_DIGITS):
+        problem, x = _problem(scene, loads, force, start, displacement)
+        size = max(float(abs(value)) for value in x)
+        x = newton(problem, x, tolerance=arb(size) * arb(10) ** (-digits - GUARD_DIGITS // 2))
+        return _vector_state(problem, prove(problem, x, radius=arb(size) * arb(10) ** (-digits)))
+
+
+def _problem(
+    scene: Any, loads: list[Any], force: Any, start: Any, displacement: Any
+) -> tuple[VectorMap, Balls]:
+    touching = [i for i, load in enumerate(loads) if load > 0]
+    P = np.array([loads[i] for i in touching])
+    E, nu = arb(scene.material.contact_modulus), arb(scene.material.poisson_ratio)
+    points, _, law = (each[touching] for each in of_scene(scene))
+    thresholds = law * cube_root(P * P)
+    friction = arb(scene.friction)
+    kernel = tangential_kernel(points, coupling(points, E), nu / (2 - nu))
+    total = np.array([arb(float(each)) for each in force]) / friction
+    q = exact(np.asarray(start)[touching].reshape(-1)) / friction
+    X = (
+        exact(displacement) / travel_of(friction, nu)
+        if np.isfinite(displacement).all()
+        else _near_the_limit(P, kernel, total)
+    )
+    eta = np.tile(X, len(P)) - kernel @ q
+    unit = (X @ X).sqrt() / (total @ total).sqrt()
+    return VectorMap(P, thresholds, kernel, total, mid(unit)), mid(np.concatenate((eta, X)))
+
+
+def _near_the_limit(P: Balls, kernel: Balls, total: Balls) -> Balls:
+    """X from what is missing of the total, where all slide: the last formula of friction.md."""
+    size = (total @ total).sqrt()
+    along, missing = total / size, P.sum() - size
+    if not missing > 0:
+        raise NotProved("the force is not below what friction can bear")
+    across = np.array([-along[1], along[0]])
+    side = (kernel @ np.outer(P, along).reshape(-1)).reshape(-1, 2) @ across
+    spread = (P * (side - (P * side).sum() / P.sum()) ** 2).sum()
+    return along * (spread / (2 * missing)).sqrt()
+
+
+def tangential_kernel(points: Balls, influence: Balls, bias: Any) -> Balls:
+    """(2n, 2n) A_ij [(1 - bias) I + 2 bias d d']."""
+    d = points[:, None] - points
+    squares = (d * d).sum(axis=2)
+    np.fill_diagonal(squares, arb(1))  # where A is 0
+    along = 2 * bias * d[..., None] * d[..., None, :] / squares[..., None, None]
+    blocks = influence[..., None, None] * (along + (1 - bias) * exact(np.eye(2)))
+    return blocks.transpose(0, 2, 1, 3).reshape(2 * len(points), -1)
+
+
+def _vector_state(problem: VectorMap, x: Balls) -> VectorReference:
+    eta = x[:-2].reshape(-1, 2)
+    lengths = np.sqrt((eta * eta).sum(axis=1))
+    sliding = lengths > problem.thresholds
+    beyond = 1 - problem.thresholds / lengths
+    slips = np.where(sliding[:, None], beyond[:, None] * eta, arb(0))
+    return VectorReference(problem.forces(x)[0], slips, x[-2:], sliding.tolist())
+
+
+# What a proof file claims; nothing here knows of the checker.
+
+
+def false_claims(document: Any) -> list[str]:
+    """The claims that do not hold for the file's own scene: none if all is well."""
+    claims, scene = document["claims"], document["scene"]
+    ((control, value),) = document["prescribed"].items()
+    with ctx.workdps(150):
+        pressed = _solved(scene, document["pressed"]["radii"], {control: float.fromhex(value)})
+        false = _outside("approach", claims["approach"], pressed.approach)
+        false += _outside("load", claims["load"], pressed.load)
+        for i, status in enumerate(claims["status"]):
+            true = "contact" if pressed.loads[i] > 0 else "open"
+            if status not in (true, "undecided"):
+                false.append(f"asperity {i} is {true}, not {status}")
+            false += _outside(f"load {i}", claims["loads"][i], pressed.loads[i])
+            false += _outside(f"gap {i}", claims["gaps"][i], pressed.gaps[i])
+        for state, claim in zip(document["sheared"], claims["shear"], strict=True):
+            false += _false_shear(scene, pressed, state, claim)
+    return false
+
+
+def _false_shear(scene: Any, pressed: Reference, state: Any, claim: Any) -> list[str]:
+    """The friction state by Ciavarella and Jaeger's theorem, and the loss of its cycle."""
+    f, nu, force = (_number(x) for x in (scene["friction"], scene["poisson_ratio"], state["force"]))
+    held = _solved(scene, state["held"]["radii"], {"load": pressed.load - force / f})
+    slid = slide(f, nu, pressed, held)
+    false = _outside("displacement", claim["displacement"], slid.displacement)
+    for i, status in enumerate(claim["status"]):
+        P, p = pressed.loads[i], held.loads[i]
+        if p > P:
+            false.append(f"the theorem does not hold at asperity {i}")
+        true = "open" if not P > 0 else "partial" if p > 0 else "sliding"
+        if status not in (true, "undecided"):
+            false.append(f"asperity {i} is {true}, not {status}")
+        false += _outside(f"force {i}", claim["forces"][i], slid.forces[i])
+        false += _outside(f"slip {i}", claim["slips"][i], slid.slips[i])
+    if claim["loss"] is None:
+        return false
+    between = _solved(scene, state["held"]["radii"], {"load": pressed.load - force / (2 * f)})
+    for low, middle, high in zip(held.loads, between.loads, pressed.loads, strict=True):
+        if not low <= middle <= high:
+            false.append("a loss without order")
+    return false + _outside("loss", claim["loss"], slid.energy)
+
+
+def _solved(scene: Any, radii: list[list[str]], control: Any) -> Reference:
+    columns = (scene[key] for key in ("x", "y", "heights", "tip_radii"))
+    x, y, heights, tips = (np.array([*map(float.fromhex, column)]) for column in columns)
+    a = np.array([sum(map(float.fromhex, radius)) for radius in radii])
+    modulus, sphere = float.fromhex(scene["contact_modulus"]), scene["sphere_radius"]
+    along = tuple(map(float.fromhex, sphere if isinstance(sphere, list) else [sphere] * 2))
+    read = SimpleNamespace(
+        asperities=SimpleNamespace(positions=np.stack([x, y], 1), tip_radii=tips, heights=heights),
+        material=SimpleNamespace(contact_modulus=modulus),
+        sphere_radius=along,
+        geometry=scene["geometry"],
+    )
+    start = 4 * modulus * a**3 * (sum(1 / R for R in along) / 2 + 1 / tips) / 3
+    return solve(read, start=start, **control)
+
+
+def _number(text: str) -> arb:
+    return arb(float.fromhex(text))
+
+
+def _outside(what: str, bounds: list[str], true: arb) -> list[str]:
+    low, high = (_number(text) for text in bounds)
+    return [] if low <= true <= high else [f"{what} is {true}, outside its bounds"]

@@ -1,17 +1,21 @@
-"""Scenes and scene generators that several tests share."""
+"""Scenes, layouts of points, and their generators, that several tests share."""
 
 from contextlib import suppress
 from dataclasses import replace
 from functools import cache
+from math import inf
 from typing import Any
 
 import multiprecision
 import numpy as np
+from flint import arb, ctx
 from hypothesis import strategies as st
-from point_layouts import lattice_patch, turned
 
 import convexrough as cr
 from convexrough.influence import Kind, couple
+from convexrough.influence.lattice import LatticeInfluence
+from convexrough.scene.lattice import Lattice
+from convexrough.scene.layout import Layout
 
 #: The ways of coupling that the tests of the dense path run through, where a scene allows them.
 OPERATORS: tuple[Kind, ...] = ("dense", "lattice", "scattered")
@@ -67,18 +71,9 @@ def prescribed(scene: cr.Scene, approach: float, control: str) -> dict[str, floa
 
 def complementary_energy(contact: cr.Contact) -> float:
     """V = sum (3/5) k P^(5/3) + P'AP / 2 - d'P, from docs/theory/convexity.md, (1)."""
-    scene, P, E = contact.scene, contact.loads, contact.scene.material.contact_modulus
-    k = np.cbrt(9 / (16 * E**2 * scene.relative_radii))
-    apart = np.hypot(*np.moveaxis(scene.contact_points[:, None] - scene.contact_points, -1, 0))
-    np.fill_diagonal(apart, np.inf)
-    return float(0.6 * k @ P ** (5 / 3) + P @ (1 / (np.pi * E * apart)) @ P / 2 - scene.offsets @ P)
-
-
-def stepped(scene: cr.Scene, by: float, steps: dict[str, Any]) -> cr.Scene:
-    """With asperities changed by so many times these steps of their heights and so on."""
-    a = scene.asperities
-    moved = {name: getattr(a, name) + by * step for name, step in steps.items()}
-    return replace(scene, asperities=replace(a, **moved))
+    with ctx.workdps(50):
+        loads = multiprecision.exact(contact.loads)
+        return float(multiprecision.energy(contact.scene, loads, arb(0)))
 
 
 def scaled(scene: cr.Scene, length: float, modulus: float) -> cr.Scene:
@@ -110,8 +105,16 @@ def operators(scene: cr.Scene) -> tuple[Kind, ...]:
     return tuple(accepted)
 
 
-#: (name, operator): each named scene with each operator that it allows.
-CASES = [(name, kind) for name, (scene, _) in NAMED.items() for kind in operators(scene)]
+#: Bases that are no sphere, with an approach; and every named scene, and the rough ones on these.
+BASES = {"flat": (inf, 1e-6), "ellipsoid": ((1.0, 2.5), 4e-5), "cylinder": ((inf, 0.8), 4e-5)}
+EVERY = NAMED | {
+    f"rough on {base}, {geometry}": (replace(rough(geometry), sphere_radius=radii), approach)
+    for geometry in ("summit", "closest")
+    for base, (radii, approach) in BASES.items()
+}
+
+#: (name, operator): each of these scenes with each operator that it allows.
+CASES = [(name, kind) for name, (scene, _) in EVERY.items() for kind in operators(scene)]
 
 
 #: The proved solution, of 50 digits if no others are asked for, from a `start` if given.
@@ -195,3 +198,79 @@ def random_cases(
     scene, approach = draw(random_scenes(crowding, most, make))
     # The last one first: hypothesis begins with it, and where there is a choice it is not dense.
     return scene, approach, draw(st.sampled_from(operators(scene)[::-1]))
+
+
+COUNT = 4000
+
+
+def disc(rng: np.random.Generator, count: int = COUNT) -> np.ndarray:
+    angle, radius = rng.uniform(0, 2 * np.pi, count), np.sqrt(rng.random(count))
+    return np.stack((radius * np.cos(angle), radius * np.sin(angle)), axis=1)
+
+
+def clustered(rng: np.random.Generator) -> np.ndarray:
+    centres = rng.uniform(-1, 1, (20, 2))
+    sizes = 10.0 ** rng.uniform(-3, -1, 20)
+    which = rng.integers(0, 20, COUNT)
+    return centres[which] + sizes[which, None] * rng.standard_normal((COUNT, 2))
+
+
+def two(rng: np.random.Generator) -> np.ndarray:
+    return np.concatenate((disc(rng, COUNT // 2), disc(rng, COUNT // 2) + np.array([300.0, 40.0])))
+
+
+def line(rng: np.random.Generator) -> np.ndarray:
+    return np.stack((rng.uniform(-1, 1, COUNT), np.zeros(COUNT)), axis=1)
+
+
+def jittered(rng: np.random.Generator) -> np.ndarray:
+    sites = np.stack(np.meshgrid(np.arange(63.0), np.arange(63.0)), axis=-1).reshape(-1, 2)
+    return (sites + rng.uniform(-0.3, 0.3, sites.shape)) * 1e-4
+
+
+def coincident(rng: np.random.Generator) -> np.ndarray:
+    points = disc(rng, COUNT // 2)
+    return np.concatenate((points, points + 10.0 ** rng.uniform(-12, -6, points.shape)))
+
+
+LAYOUTS = {each.__name__: each for each in (disc, clustered, two, line, jittered, coincident)}
+
+
+def loadings(count: int, rng: np.random.Generator) -> np.ndarray:
+    """(5, count) equal loads, over many decades, one, of either sign, and of few."""
+    equal, few = np.full(count, 0.5 + 2.0**-20), rng.random(count) * (rng.random(count) < 0.05)
+    signs, one = rng.uniform(-1.0, 1.0, count), np.eye(count)[count // 3]
+    return np.array([equal, 10 ** rng.uniform(-30, 0, count), one, signs, few])
+
+
+LATTICES = {
+    "hexagonal": [[1.0, 0.0], [0.5, np.sqrt(0.75)]],
+    "square": [[1.0, 0.0], [0.0, 1.0]],
+    "rectangular": [[1.0, 0.0], [0.0, 2.6]],
+    "sheared": [[1.0, 0.0], [7.3, 1.4]],
+}
+
+
+def turned(basis: Any, angle: float) -> np.ndarray:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array(basis) @ np.array([[c, s], [-s, c]])
+
+
+def lattice_patch(basis: np.ndarray, count: int) -> np.ndarray:
+    """The sites nearest to the origin, of a lattice given by any basis."""
+    steps = np.arange(-120, 121) if count > 300 else np.arange(-40, 41)
+    points = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2) @ basis
+    order = np.argsort((points**2).sum(axis=1), kind="stable")
+    return points[order[:count]]
+
+
+def lattice_operator(
+    points: np.ndarray, scale: float, lattice: Lattice | None = None
+) -> LatticeInfluence:
+    """The operator of points on a lattice, which is found if it is not given."""
+    lattice = lattice or Lattice.through(points)
+    assert lattice is not None
+    sites = lattice.sites(points)
+    assert sites is not None
+    layout = Layout(points, (lattice, sites))
+    return LatticeInfluence(points, np.arange(len(points)), layout, lattice, scale)

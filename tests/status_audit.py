@@ -13,13 +13,13 @@ from typing import Any
 import multiprecision
 import numpy as np
 from flint import arb, ctx
-from multiprecision import Friction, slide, travel_of
+from friction_scenes import FRICTION, with_friction
+from multiprecision import Friction, slide, solve_vectors, travel_of
 from scenes import on_lattice, on_sphere, operators, scaled, scattered, solve_exactly
-from vector_oracle import solve_vectors
 
 import convexrough as cr
+from convexrough.arrays import Array
 
-FRICTION = 0.5
 DIGITS = 60  # of the exact states, whose differences lose some where Q is small
 BITS = 4096  # nothing is rounded in a comparison
 
@@ -40,40 +40,35 @@ class Wrong(AssertionError):
 
 @dataclass
 class Tally:
-    """What was found, by kind of scene, operator and stage."""
+    """What was found, by kind of scene and stage."""
 
     scenes: int = 0
     refused: int = 0
     unsolved: int = 0  # by the oracle, which needs both signs of every gap
     unsolved_vectors: int = 0  # states with the full tangential kernel
-    statuses: dict[tuple[str, str, str], list[int]] = field(default_factory=dict)
-    ratios: dict[tuple[str, str], list[float]] = field(default_factory=dict)
+    statuses: dict[tuple[str, str], list[int]] = field(default_factory=dict)
 
-    def count(self, kind: str, operator: str, stage: str, statuses: Any) -> None:
-        seen = self.statuses.setdefault((kind, operator, stage), [0, 0])
+    def count(self, kind: str, stage: str, statuses: Any) -> None:
+        seen = self.statuses.setdefault((kind, stage), [0, 0])
         seen[0] += len(statuses)
         seen[1] += int((statuses == "undecided").sum())
-
-    def compare(self, operator: str, stage: str, bounds: Any, values: Any, exact: Any) -> None:
-        """Bound by bound, of numbers or vectors; the ratio is of the largest bound and error."""
-        errors = []
-        with ctx.workprec(BITS):
-            for bound, value, true in zip(bounds, values, exact, strict=True):
-                balls = [true] if isinstance(true, arb) else true
-                pairs = zip(np.atleast_1d(value), balls, strict=True)
-                off = [arb(float(v)) - each for v, each in pairs]
-                square = sum((each * each for each in off), arb(0))
-                if bound != np.inf:
-                    require(square <= arb(float(bound)) ** 2, f"{stage} bound {bound} of {value}")
-                errors.append(float(square.mid().sqrt()))
-        if len(errors) and np.isfinite(bounds).all() and max(errors) > 0:
-            ratio = float(np.max(bounds)) / max(errors)
-            self.ratios.setdefault((operator, stage), []).append(ratio)
 
 
 def require(holds: Any, message: str) -> None:
     if not bool(holds):
         raise Wrong(message)
+
+
+def compare(stage: str, bounds: Any, values: Any, exact: Any) -> None:
+    """Bound by bound, of numbers or vectors."""
+    with ctx.workprec(BITS):
+        for bound, value, true in zip(bounds, values, exact, strict=True):
+            balls = [true] if isinstance(true, arb) else true
+            pairs = zip(np.atleast_1d(value), balls, strict=True)
+            off = (arb(float(v)) - each for v, each in pairs)
+            square = sum((each * each for each in off), arb(0))
+            within = bound == np.inf or square <= arb(float(bound)) ** 2
+            require(within, f"{stage} bound {bound} of {value}")
 
 
 def draw(seed: int) -> tuple[str, cr.Scene, float]:
@@ -150,25 +145,73 @@ def _audit_scene(seed: int, tally: Tally) -> None:
         contact = cr.press(scene, **given, influence=operator)
     exact = solve_exactly(scene, **given, start=contact.loads, digits=DIGITS)
     proof = contact.certificate
-    tally.count(kind, operator, "press", proof.status)
+    tally.count(kind, "press", proof.status)
     if proof.scope == "none":
         require((proof.status == "undecided").all(), "a status without a proof")
         return
-    audit_pressed(operator, proof, contact.loads, exact, tally)
-    _audit_shear(kind, operator, contact, exact, float(rng.choice(FRACTIONS)), tally)
+    assert_honest(proof, contact.loads, exact)
+    _audit_shear(kind, contact, exact, float(rng.choice(FRACTIONS)), tally)
 
 
-def audit_pressed(
-    operator: str, proof: cr.Certificate, loads: Any, exact: Any, tally: Tally
-) -> None:
-    """What a certificate says of loads, the solution being `exact`."""
+def assert_honest(proof: cr.Certificate, loads: Any, exact: Any) -> None:
+    """Every status agrees with the proved solution, and every bound covers the distance to it."""
     for status, load, gap in zip(proof.status, exact.loads, exact.gaps, strict=True):
         require(status in ("contact", "open", "undecided"), f"the status {status}")
         require(status != "contact" or load > 0, "contact of an open asperity")
         require(status != "open" or gap > 0, "open of one that touches")
-    tally.compare(operator, "load", proof.load_errors, loads, exact.loads)
-    tally.compare(operator, "gap", proof.gap_errors, proof.gaps, exact.gaps)
-    tally.compare(operator, "approach", [proof.approach_error], [proof.approach], [exact.approach])
+    compare("load", proof.load_errors, loads, exact.loads)
+    compare("gap", proof.gap_errors, proof.gaps, exact.gaps)
+    compare("approach", [proof.approach_error], [proof.approach], [exact.approach])
+
+
+def excess(scene: cr.Scene, loads: Array, exact: Any, total: float | None = None) -> float:
+    """The energy of loads, in many digits scaled to a prescribed total, above that of `exact`."""
+    with ctx.workdps(120):
+        given = [arb(float(load)) for load in loads]
+        if total is not None:
+            given = [arb(total) * each / sum(given) for each in given]
+        one, other = (
+            multiprecision.energy(scene, each, exact.approach) for each in (given, exact.loads)
+        )
+        return float((one - other).mid())
+
+
+def attack(kind: str, loads: Array, rng: np.random.Generator) -> Array:
+    """Wrong loads: each a mistake that a user or a solver could make."""
+    wrong = loads.copy()
+    loaded = np.flatnonzero(loads)
+    if kind == "dropped" and len(loaded):
+        wrong[rng.choice(loaded)] = 0.0
+    elif kind == "smallest dropped" and len(loaded):
+        wrong[loaded[np.argmin(loads[loaded])]] = 0.0
+    elif kind == "added":
+        wrong[rng.integers(len(loads))] += loads.max() * 10.0 ** rng.uniform(-16, 0)
+    elif kind == "perturbed":
+        wrong *= 1 + 10.0 ** rng.uniform(-15, -1) * rng.standard_normal(len(loads))
+        wrong = np.maximum(wrong, 0.0)
+    elif kind == "swapped":
+        i, j = rng.integers(len(loads), size=2)
+        wrong[[i, j]] = wrong[[j, i]]
+    elif kind == "zero":
+        wrong[:] = 0.0
+    elif kind == "random":
+        wrong = loads.max() * rng.random(len(loads)) ** 4
+    elif kind == "huge":
+        wrong = loads * 1e6
+    elif kind == "scaled":
+        wrong = loads * (1 + rng.uniform(-0.1, 0.1))
+    elif kind == "rounded":
+        digits = int(rng.integers(1, 16))
+        wrong = np.array([float(f"{load:.{digits}e}") for load in loads])
+    elif kind == "single precision":
+        wrong = loads.astype(np.float32).astype(np.float64)
+    return wrong
+
+
+ATTACKS = (
+    *("none", "dropped", "smallest dropped", "added", "perturbed", "swapped", "zero", "random"),
+    *("huge", "scaled", "rounded", "single precision"),
+)
 
 
 def _slid(contact: cr.Contact, full: Any, force: Any) -> Friction | None:
@@ -185,9 +228,8 @@ def _slid(contact: cr.Contact, full: Any, force: Any) -> Friction | None:
     return slid
 
 
-def _audit_shear(
-    kind: str, operator: str, contact: cr.Contact, full: Any, fraction: float, tally: Tally
-) -> None:
+def _audit_shear(kind: str, contact: cr.Contact, full: Any, fraction: float, tally: Tally) -> None:
+    kind = kind if fraction < 1 else "limit"
     force = fraction * FRICTION * contact.load
     with ctx.workdps(DIGITS + 30):
         try:
@@ -204,24 +246,21 @@ def _audit_shear(
             require(status != "sliding" or (load > 0 and slides), f"{stage}: sliding of {i}")
             require(status != "partial" or (load > 0 and not slides), f"{stage}: partial of {i}")
             require(status != "open" or not load > 0, f"{stage}: open of {i}")
-        tally.count(kind if fraction < 1 else "limit", operator, stage, found.status)
+        tally.count(kind, stage, found.status)
     proof = state.certificate
-    tally.compare(operator, "force", proof.force_errors, state.forces, forces)
-    errors = vector.certificate.force_errors
-    tally.compare(operator, "vector force", errors, vector.forces[:, 0], forces)
-    _audit_vectors(kind if fraction < 1 else "limit", operator, contact, full, force, tally)
+    compare("force", proof.force_errors, state.forces, forces)
+    compare("vector force", vector.certificate.force_errors, vector.forces[:, 0], forces)
+    _audit_vectors(kind, contact, full, force, tally)
     if exact:
-        tally.compare(operator, "slip", proof.slip_errors, state.slips, exact.slips)
-        displacement, error = [state.displacement], [proof.displacement_error]
-        tally.compare(operator, "displacement", error, displacement, [exact.displacement])
-        tally.compare(operator, "loss", [cycle.loss_error], [cycle.loss], [exact.energy])
+        compare("slip", proof.slip_errors, state.slips, exact.slips)
+        error = proof.displacement_error
+        compare("displacement", [error], [state.displacement], [exact.displacement])
+        compare("loss", [cycle.loss_error], [cycle.loss], [exact.energy])
         if force < FRICTION * contact.load:
-            _audit_history(operator, contact, full, force, exact, tally)
+            _audit_history(contact, full, force, exact)
 
 
-def _audit_history(
-    operator: str, contact: cr.Contact, full: Any, force: float, there: Friction, tally: Tally
-) -> None:
+def _audit_history(contact: cr.Contact, full: Any, force: float, there: Friction) -> None:
     """To Q and back, and half of the way back and there again, which is forgotten."""
     past = cr.history(contact, forces=[force, -0.25 * force, force, -force])
     with ctx.workdps(DIGITS + 30):
@@ -235,17 +274,14 @@ def _audit_history(
         once, back = there.energy / 4, inner.energy / 2
         losses = [once, once + back, once + 2 * back, once + 2 * back + there.energy / 2]
         forces = there.forces - 2 * inner.forces
-    errors = past.displacement_errors
-    tally.compare(operator, "past displacement", errors, past.displacements, rises)
-    tally.compare(operator, "past loss", past.loss_errors, past.losses, losses)
+    compare("past displacement", past.displacement_errors, past.displacements, rises)
+    compare("past loss", past.loss_errors, past.losses, losses)
     one, other = (cr.shear(contact, force=Q).certificate for Q in (force, 0.625 * force))
     errors = one.force_errors + 2 * other.force_errors + 1e-14 * abs(force)
-    tally.compare(operator, "past force", errors, past.asperity_forces[1], forces)
+    compare("past force", errors, past.asperity_forces[1], forces)
 
 
-def _audit_vectors(
-    kind: str, operator: str, contact: cr.Contact, full: Any, force: float, tally: Tally
-) -> None:
+def _audit_vectors(kind: str, contact: cr.Contact, full: Any, force: float, tally: Tally) -> None:
     """The full tangential kernel, any Poisson's ratio and direction, against its own oracle."""
     rng = np.random.default_rng(int.from_bytes(np.float64(force).tobytes(), "little"))
     angle = rng.uniform(0, 2 * np.pi)
@@ -254,15 +290,13 @@ def _audit_vectors(
     if np.hypot(*pair) > FRICTION * contact.load:
         pair *= 1 - 1e-15
     tilted = _with_poisson(contact, float(rng.uniform(0.0, 0.5)))
-    audit_vectors(kind, operator, tilted, full, pair, tally)
+    audit_vectors(kind, tilted, full, pair, tally)
 
 
-def audit_vectors(
-    kind: str, operator: str, tilted: cr.Contact, full: Any, pair: Any, tally: Tally
-) -> None:
+def audit_vectors(kind: str, tilted: cr.Contact, full: Any, pair: Any, tally: Tally) -> None:
     """The state of a contact with exact loads `full` under a shear force along x and y."""
     state = cr.shear_vector(tilted, force=pair)
-    tally.count(kind, operator, "tensor", state.status)
+    tally.count(kind, "tensor", state.status)
     for status, load in zip(state.status, full.loads, strict=True):
         require(status in ("open", "undecided") or load > 0, "tensor: status of an open asperity")
         require(status != "open" or not load > 0, "tensor: open of one that touches")
@@ -280,31 +314,23 @@ def audit_vectors(
     with ctx.workdps(DIGITS + 30):
         travel, forces = travel_of(arb(FRICTION), nu), FRICTION * true.forces
         slips, far = travel * true.slips, [travel * true.displacement]
-    errors = proof.force_errors[touching]
-    tally.compare(operator, "tensor force", errors, state.forces[touching], forces)
+    compare("tensor force", proof.force_errors[touching], state.forces[touching], forces)
     if np.isfinite(state.displacement).all():
-        errors = proof.slip_errors[touching]
-        tally.compare(operator, "tensor slip", errors, state.slips[touching], slips)
-        errors = [proof.displacement_error]
-        tally.compare(operator, "tensor displacement", errors, [state.displacement], far)
+        compare("tensor slip", proof.slip_errors[touching], state.slips[touching], slips)
+        compare("tensor displacement", [proof.displacement_error], [state.displacement], far)
 
 
 def _with_poisson(contact: cr.Contact, nu: float) -> cr.Contact:
     """At nu = 0 the tensor is the scalar kernel, and the theorem holds for vectors along x."""
-    scene = contact.scene
-    material = cr.Material(scene.material.contact_modulus, nu)
-    return replace(contact, scene=replace(scene, material=material))
+    return replace(contact, scene=with_friction(contact.scene, nu=nu))
 
 
 def report(tally: Tally) -> str:
-    """Counts of statuses, and how far bounds are above errors."""
+    """Counts of statuses."""
     beyond = f"{tally.unsolved} beyond the oracle, {tally.unsolved_vectors} of the vector states"
     lines = [f"{tally.scenes:,} scenes, {tally.refused} refused, {beyond}"]
     for key, (statuses, undecided) in sorted(tally.statuses.items()):
         lines.append(f"{' '.join(key)}: {statuses:,}, {100 * undecided / statuses:.2f} % undecided")
-    for key, ratios in sorted(tally.ratios.items()):
-        least, median = np.quantile(ratios, [0.0, 0.5])
-        lines.append(f"{' '.join(key)}: bounds {least:.2g} times the errors, median {median:.2g}")
     return "\n".join(lines)
 
 

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from friction_scenes import FRICTION, pressed, with_friction
-from path_scenes import LARGEST, PAPER
+from friction_scenes import FRICTION, LARGEST, PAPER, pressed, with_friction
 from scenes import MATERIAL, PAPER_APPROACH, hexagonal, paper
 
 import convexrough as cr
@@ -106,7 +105,6 @@ BAD = [
     (lambda: swung([np.nan, 1.0]), r"force_amplitudes\[0\].*finite"),
     (lambda: swung(load_amplitudes=[1e-9, 0, 0]), "load_amplitudes: found 3 values, expected 2, o"),
     (lambda: swung([["a", 0.0]], kind="vector"), "force_amplitudes"),
-    (lambda: swung(np.zeros((0, 2)), kind="vector"), "force_amplitudes"),
     (lambda: swung(kind="plastic"), "kind"),
     (lambda: swung(load_amplitudes=[0.1 * P] * 2, kind="elastic"), r"load_amplitudes.*not .exact."),
     (lambda: swung(force=P), "force:"),
@@ -119,7 +117,7 @@ BAD = [
     # Derivatives.
     (lambda: LIFTED.gradient(load=1.0), "a contact with a load"),
     (lambda: cr.history(CONTACT, forces=[LIMIT]).gradient(losses=[1.0]),
-     "in gross sliding a history has no derivative"),
+     "in gross sliding there is no derivative"),
     (lambda: CONTACT.gradient(loads=[1.0, 2.0]), "61 values, one per asperity"),
     (lambda: cr.cycle(CONTACT, maximum=LIMIT).gradient(holding="approach"),
      "at constant approach f P may fall below"),
@@ -172,12 +170,10 @@ BAD = [
     (lambda: cr.solvers.Conic(max_iterations=-3), "max_iterations: found -3, expected a whole"),
     (lambda: cr.prove_order(CONTACT, most="a"), "most: found 'a', expected a whole number"),
     (lambda: cr.certify(PAPER, [1e99] * 61, load=1.0), r"found 1e\+99, .*, at most 1e\+60"),
-    (lambda: cr.Asperities(pd.DataFrame({"Y [mm]": [0.0], "X [mm]": [1.0]}), 1.0), "columns Y "),
     (lambda: cr.Asperities(pd.DataFrame({"x": [0.0], "height": [1.0]}), 1.0), "columns x, height"),
     (lambda: cr.Asperities(TWO[["x", "y"]], 1.0, TWO["z"][::-1]), "heights: found another index"),
     (lambda: cr.certify(PAPER, pd.Series(np.ones(61))[::-1], load=1.0), "index in another order"),
     (lambda: cr.compare.compare(PAPER), "approach, load: found neither"),
-    (lambda: cr.compare.compare(PAPER, load=-1.0), "load: found -1"),
     (lambda: cr.testing.assert_agree(CONTACT, CONTACT.loads), "scene: found none"),
     (lambda: cr.testing.assert_agree(CONTACT, OTHER), "second: found 1, expected as many"),
     (lambda: cr.testing.assert_agree(CONTACT, CONTACT, within=5), "within: found 5, expected a fr"),

@@ -1,4 +1,4 @@
-"""Results in the forms people use: printed, as tables, pickled, drawn, and in the docstrings."""
+"""Results in the forms people use: printed, as tables, pickled, drawn; docstrings; imports."""
 
 import copy
 import dataclasses
@@ -7,6 +7,8 @@ import html
 import importlib
 import pickle
 import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -232,3 +234,36 @@ def test_examples_in_docstrings(path: Path, tmp_path: Path) -> None:
         runner.run(test)
     assert runner.tries > 0
     assert runner.failures == 0
+
+
+LAZY = """
+import sys
+import convexrough as cr
+heavy = {"numpy", "scipy", "cvxpy", "clarabel", "osqp", "matplotlib", "pydantic", "click", "rich"}
+assert not heavy & {*sys.modules}
+from convexrough import cli
+cli.main(["--help"])
+unused = {"pydantic", "matplotlib", "rich", "cvxpy", "scipy.spatial", "scipy.linalg"}
+assert not unused & {*sys.modules}
+cr.testing.assert_certified, cr.compare.compare
+scene = cr.Scene(1.0, cr.Asperities([[0.0, 0.0]], 1.0), cr.Material(1.0, 0.3))
+repr(cr.press(scene, approach=1e-4))
+file = cr.read_scene(cr.__path__[0] + "/run/new_scene.toml")
+file.compute(file.press())
+assert not {"pandas", "xarray", "matplotlib"} & {*sys.modules}
+cr.plots.press_figures
+assert "matplotlib.pyplot" not in sys.modules
+"""
+
+
+def test_libraries_are_imported_when_they_are_needed() -> None:
+    done = subprocess.run([sys.executable, "-c", LAZY], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert all(name in done.stdout for name in ("run", "verify", "new", "paper"))
+
+
+def test_every_public_name_is_there() -> None:
+    assert all(hasattr(cr, name) for name in cr.__all__)
+    assert set(cr.__all__) == set(dir(cr))
+    with pytest.raises(AttributeError, match="pres"):
+        _ = cr.pres

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from extended import middle
 from flint import arb, ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from multiprecision import middle
 
 from convexrough.arithmetic.balls import Ball, residual
 from convexrough.arithmetic.pairs import MANY, Pair, two_sum
@@ -41,16 +41,12 @@ def balls(rows: list[tuple[float, float, float]]) -> Ball:
     return Ball(Pair(high, low), radius)
 
 
-def exact(x: float) -> arb:
-    return arb(float(x))
-
-
 def samples(ball: Ball, i: int) -> list[arb]:
     """The middle, both ends and others; where the radius is infinite, numbers of many sizes."""
     mid, radius = middle(ball[i]), ball.radius[i]
     if radius == INF:
         return [mid, arb(0), arb(1), arb(-1), arb("1e200"), arb("-1e-200")]
-    return [mid + exact(radius) * share for share in (-1, arb(-1) / 3, 0, arb(1) / 2, 1)]
+    return [mid + arb(radius) * share for share in (-1, arb(-1) / 3, 0, arb(1) / 2, 1)]
 
 
 def holds(ball: Ball, i: int, number: arb) -> bool:
@@ -59,7 +55,7 @@ def holds(ball: Ball, i: int, number: arb) -> bool:
     assert isfinite(ball.mid.high[i] + ball.mid.low[i])
     if radius == INF:
         return True
-    return bool(number.is_finite() and abs(number - middle(ball[i])) <= exact(radius))
+    return bool(number.is_finite() and abs(number - middle(ball[i])) <= arb(radius))
 
 
 @pytest.fixture(autouse=True)
@@ -154,16 +150,16 @@ def test_ends(rows: Any) -> None:
     for i in range(len(x)):
         for a in samples(x, i):
             for end, sign in ((x.lower[i], -1), (x.upper[i], 1)):
-                assert abs(end) == INF or sign * (exact(end) - a) >= 0
-            assert x.size[i] == INF or abs(a) <= exact(x.size[i])
-            assert x.error[i] == INF or abs(a - exact(x.value[i])) <= exact(x.error[i])
+                assert abs(end) == INF or sign * (arb(end) - a) >= 0
+            assert x.size[i] == INF or abs(a) <= arb(x.size[i])
+            assert x.error[i] == INF or abs(a - arb(x.value[i])) <= arb(x.error[i])
             assert not (x.positive[i] and a <= 0)
             assert not (x.negative[i] and a >= 0)
     finite = np.isfinite(x.lower) & np.isfinite(x.upper)
     between = Ball.between(x.lower[finite], x.upper[finite])
     for i, j in enumerate(np.flatnonzero(finite)):
-        assert holds(between, i, exact(x.lower[j]))
-        assert holds(between, i, exact(x.upper[j]))
+        assert holds(between, i, arb(x.lower[j]))
+        assert holds(between, i, arb(x.upper[j]))
 
 
 def test_what_is_no_number_is_unknown() -> None:

@@ -1,14 +1,16 @@
-"""Commands that are killed, out of room or in each other's way, and spoiled files of every kind."""
+"""Commands as processes: killed, interrupted, out of room, or without a reader; spoiled files."""
 
 import json
 import os
 import random
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
-from scene_files import scene_text
+from scene_files import HEXAGONAL, scene_text
 
 from convexrough.atomic import remove_unfinished
 
@@ -77,3 +79,88 @@ def test_new_on_a_full_disk_leaves_nothing(tmp_path: Path) -> None:
     assert done.returncode == 2
     assert done.stderr == "convexrough: error: a.toml: cannot be written: File too large\n"
     assert list(tmp_path.iterdir()) == []
+
+
+# A job in the background inherits a signal that is ignored; this one must not.
+START = (
+    "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    "from convexrough.__main__ import main; print('started', flush=True); sys.exit(main())"
+)
+
+
+def module(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "convexrough", *arguments]
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
+
+
+def test_exit_status_of_a_process(tmp_path: Path) -> None:
+    (tmp_path / "good.toml").write_text(scene_text())
+    good = module("run", "good.toml", "--json", "--no-figures", cwd=tmp_path)
+    assert (good.returncode, good.stderr) == (0, "")
+    json.loads(good.stdout)
+    bad = module("run", "none.toml", cwd=tmp_path)
+    assert (bad.returncode, bad.stdout) == (2, "")
+    assert "Traceback" not in bad.stderr
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["good-results", "good.toml"]
+
+
+def test_a_line_is_completed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("_CONVEXROUGH_COMPLETE", "bash_complete")
+    monkeypatch.setenv("COMP_WORDS", "convexrough run --pr")
+    monkeypatch.setenv("COMP_CWORD", "2")
+    done = module(cwd=tmp_path)
+    assert (done.returncode, done.stdout.split(), done.stderr) == (0, ["plain,--proof"], "")
+
+
+def test_an_interrupt_while_an_object_is_freed(tmp_path: Path) -> None:
+    """Python ignores errors of `__del__`, so this interrupt would be lost."""
+    code = (
+        "import signal, sys, convexrough.cli.program as program\n"
+        "class Freed:\n"
+        "    def __del__(self): signal.raise_signal(signal.SIGINT)\n"
+        "def status(arguments):\n"
+        "    import time; Freed(); [time.sleep(0.01) for _ in range(1000)]\n"
+        "program._status = status\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler); sys.exit(program.main([]))"
+    )
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (ran.returncode, ran.stderr) == (130, "convexrough: interrupted\n")
+
+
+@pytest.mark.sample(1)
+@pytest.mark.parametrize("delay", [0.02, 0.1, 0.3, 0.6, 1.0])
+def test_an_interrupt_at_any_moment(tmp_path: Path, delay: float) -> None:
+    rough = HEXAGONAL.replace("0.0025", "1e-4").replace("0.02", "8e-4")
+    (tmp_path / "a.toml").write_text(scene_text(rough + "height_std = 1e-7\nseed = 1"))
+    running = subprocess.Popen(
+        [sys.executable, "-c", START, "run", "a.toml"],
+        cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    assert running.stdout is not None
+    running.stdout.readline()
+    time.sleep(delay)
+    running.send_signal(signal.SIGINT)
+    _, said = running.communicate()
+    assert (running.returncode, said) == (130, "convexrough: interrupted\n")
+    assert not [path for path in tmp_path.rglob(".*") if path.is_file()]
+
+
+@pytest.mark.sample(1)
+@pytest.mark.parametrize(
+    ("where", "status", "said"),
+    [
+        (">&-", 0, ""),
+        ("| true", 1, ""),  # as in `convexrough run a.toml | head -0`
+        (">/dev/full", 1, "standard output: No space left on device"),
+    ],
+)
+def test_an_output_that_nobody_takes(tmp_path: Path, where: str, status: int, said: str) -> None:
+    (tmp_path / "a.toml").write_text(scene_text())
+    run = f"sleep 0.2; '{sys.executable}' -m convexrough run a.toml --no-figures"
+    code = f"({run}; echo $? >status) {where}"
+    done = subprocess.run(
+        ["sh", "-c", code], cwd=tmp_path, stderr=subprocess.PIPE, text=True, check=False
+    )
+    assert int((tmp_path / "status").read_text()) == status
+    assert done.stderr == (f"convexrough: error: {said}\n" if said else "")
+    assert (tmp_path / "a-results" / "summary.json").exists()

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from attacks import ATTACKS, assert_honest, attack
 from friction_scenes import FRICTION, lengths, pressed
 from numpy.testing import assert_allclose
 from scenes import NAMED, PAPER_APPROACH, hexagonal, paper, reference
+from status_audit import ATTACKS, assert_honest, attack
 
 import convexrough as cr
 from convexrough import FrictionNewton, shear_vector
@@ -98,11 +98,9 @@ CONTROLS = [{"approach": PAPER_APPROACH}, {"load": 2e-7}]
 @pytest.mark.parametrize("control", CONTROLS, ids=["approach", "load"])
 @pytest.mark.parametrize("kind", NO_LOADS)
 def test_what_are_no_loads_is_an_error(kind: str, control: Any) -> None:
+    """Nor are loads that are all zero under a total."""
     with pytest.raises(cr.SolverError, match="liar: no loads were found: loads"):
         cr.press(paper(), **control, solver=of_loads(NO_LOADS[kind]))
-
-
-def test_loads_that_are_all_zero_are_an_error_under_a_total() -> None:
     with pytest.raises(cr.SolverError, match="liar: all loads are 0, but a total is prescribed"):
         cr.press(paper(), load=2e-7, solver=of_loads(lambda loads, rng: 0.0 * loads))
 

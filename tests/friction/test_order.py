@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from path_scenes import around, on_flat, ring, shaded
+from friction_scenes import around, on_flat, ring, shaded
 from scenes import MATERIAL, on_sphere
 
 import convexrough as cr

@@ -5,7 +5,7 @@ import pytest
 from flint import arb
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from point_layouts import on_lattice
+from scenes import lattice_operator
 
 from convexrough.arrays import Array
 from convexrough.influence.coupling import inverse_distances
@@ -116,7 +116,7 @@ def test_points_off_their_sites_are_counted(seed: int, share: float, off: float)
     lattice = Lattice(np.zeros(2), basis, 1e-13 + off * float(np.hypot(*basis[0])))
     sites = np.stack(np.divmod(np.arange(100), 10), axis=1) @ basis
     points = sites + rng.uniform(-off, off, sites.shape) * lattice.spacing * (1 - 1e-9)
-    A = on_lattice(points, SCALE, lattice)
+    A = lattice_operator(points, SCALE, lattice)
     radius = lattice.spacing / share
     if not A.semidefinite_with(radius):
         return

@@ -1,4 +1,4 @@
-"""What every compliance operator promises, against sums over all pairs in 160 bits."""
+"""What every compliance operator promises, against sums over all pairs in 160 bits and more."""
 
 import itertools
 import sys
@@ -9,15 +9,27 @@ from fractions import Fraction
 from functools import partial
 from types import FrameType
 from typing import Any
+from unittest.mock import Mock
 
 import multiprecision
 import numpy as np
 import pytest
-from extended import inverse_sums, middle, pulled
 from flint import arb, ctx
-from multiprecision import exact, quotient
-from point_layouts import BASES, LAYOUTS, lattice_patch, loadings, on_lattice, turned
-from scenes import paper
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from multiprecision import exact, inverse_sum, inverse_sums, middle, of_scene, pulled, quotient
+from scenes import (
+    LATTICES,
+    LAYOUTS,
+    jittered,
+    lattice_operator,
+    lattice_patch,
+    loadings,
+    on_sphere,
+    paper,
+    rough,
+    turned,
+)
 
 import convexrough as cr
 from convexrough.arithmetic.balls import Ball
@@ -30,8 +42,11 @@ from convexrough.influence import couple, coupling, lattice, scattered
 from convexrough.influence.coupling import Coupling, Influence, JointCoupling, inverse_distances
 from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.lattice import LatticeInfluence
+from convexrough.influence.pair_sums import Product
 from convexrough.influence.scattered import ScatteredInfluence
 from convexrough.influence.shells import fitted_shells, shells
+from convexrough.influence.softened import Softened
+from convexrough.influence.splitting import Splitting
 from convexrough.normal.certificate import certify_on
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.refine import trial
@@ -48,8 +63,8 @@ EVEN = ("disc", "jittered")
 def operator(kind: str, layout: str, rng: np.random.Generator, count: int = 0) -> Any:
     if kind == "lattice":
         count = count or int(rng.choice([40, 500, 1000]))
-        points = lattice_patch(turned(BASES[layout], 0.3), count)
-        return on_lattice(points + rng.choice([0.0, 300.0, 1e6]), SCALE)
+        points = lattice_patch(turned(LATTICES[layout], 0.3), count)
+        return lattice_operator(points + rng.choice([0.0, 300.0, 1e6]), SCALE)
     points = LAYOUTS[layout](rng)
     if kind == "dense":  # more than 64 points are summed in blocks
         return DenseInfluence.assemble(rng.permutation(points)[: count or 500], SCALE)
@@ -58,7 +73,7 @@ def operator(kind: str, layout: str, rng: np.random.Generator, count: int = 0) -
 
 CASES = [
     *(("dense", layout) for layout in ("disc", "coincident")),
-    *(("lattice", basis) for basis in BASES),
+    *(("lattice", basis) for basis in LATTICES),
     *(("scattered", layout) for layout in LAYOUTS),
 ]
 each_operator = pytest.mark.parametrize(("kind", "layout"), CASES)
@@ -190,7 +205,7 @@ def at_line(k: int, call: Callable[[], Any], other: Callable[[], Any]) -> tuple[
 def interrupted(points: Array, ask: Any, own: Any, other: Any, first: Any) -> Iterator[Any]:
     """What `ask` returns for `own` if another thread asks for `other` at any moment."""
     for k in itertools.count():
-        A = on_lattice(points, SCALE)
+        A = lattice_operator(points, SCALE)
         ask(A, first)
         found, reached = at_line(k, partial(ask, A, own), partial(ask, A, other))
         yield found
@@ -205,9 +220,9 @@ def test_threads_that_restrict_one_operator_at_once_get_their_own() -> None:
 
 
 def test_threads_whose_loads_reach_unequally_far_get_their_own_sums() -> None:
-    points = lattice_patch(turned(BASES["square"], 0.3), 60)
+    points = lattice_patch(turned(LATTICES["square"], 0.3), 60)
     near, everywhere = Pair.exact(np.eye(60)[0]), Pair.exact(np.ones(60))
-    true = on_lattice(points, SCALE).sums(near)
+    true = lattice_operator(points, SCALE).sums(near)
     for found in interrupted(points, LatticeInfluence.sums, near, everywhere, first=near):
         assert (np.abs((found - true).value) <= found.radius + true.radius).all()
 
@@ -233,7 +248,7 @@ def test_slopes(kind: str, layout: str, seed: int) -> None:
     for load in loadings(len(A), rng):
         off, errors = off_and_errors(A, load, rows)
         top = (SCALE * A.falloff(np.abs(load), 2)).max()
-        assert off.max() <= 1e-10 * top or layout not in (*EVEN, *BASES)
+        assert off.max() <= 1e-10 * top or layout not in (*EVEN, *LATTICES)
         limit = {"lattice": 1e-11 * max(1.0, 1e-3 * shift), "dense": 1e-12}.get(kind, np.inf)
         assert errors.max() <= limit * top or layout == "coincident"
 
@@ -290,9 +305,9 @@ def test_many_points_of_a_lattice_are_exactly_on_their_sites(family: str, geomet
             assert abs(float(off)) <= found.radius[i] <= 1e-21 * found.mid.high[i]
 
 
-@pytest.mark.parametrize("name", BASES)
+@pytest.mark.parametrize("name", LATTICES)
 def test_what_is_nearly_a_lattice_is_none(name: str) -> None:
-    points = lattice_patch(np.array(BASES[name]), 500)
+    points = lattice_patch(np.array(LATTICES[name]), 500)
     assert Lattice.through(points) is not None
     noise = 1e-9 * np.random.default_rng(2).standard_normal(points.shape)
     for moved in (slice(None), 0, 100, 499):
@@ -307,13 +322,13 @@ def test_what_is_nearly_a_lattice_is_none(name: str) -> None:
 def test_shells_do_not_overlap(seed: int) -> None:
     """The premise of the shell lemma: s_i + s_j <= r_ij for all pairs, touching or not."""
     rng = np.random.default_rng(seed)
-    points = lattice_patch(turned(BASES[sorted(BASES)[seed % 4]], 0.2), 300)
+    points = lattice_patch(turned(LATTICES[sorted(LATTICES)[seed % 4]], 0.2), 300)
     points = rng.permutation(points)[:120] + rng.choice([0.0, 1e6])
     touching = rng.random(120) < rng.random() ** 3
     radii = rng.lognormal(0, rng.choice([0.0, 0.0, 3.0]), 120) * touching
     inverse, share = inverse_distances(points, points), rng.choice([0.0, rng.random(), 1.0])
     dense, mesh = DenseInfluence.assemble(points, SCALE), ScatteredInfluence(points, SCALE)
-    for A in (on_lattice(points, SCALE), mesh, dense):
+    for A in (lattice_operator(points, SCALE), mesh, dense):
         with np.errstate(divide="ignore"):
             fitted, halves = SCALE / fitted_shells(A, radii, share), SCALE / shells(A)
         for s in (fitted, halves):
@@ -324,8 +339,8 @@ def test_shells_do_not_overlap(seed: int) -> None:
 def test_the_most_crowded_pair(basis: str) -> None:
     """Also if it is not one of nearest neighbours, at the ends of rows, and if none touches."""
     rng = np.random.default_rng(1)
-    points = np.indices((6, 7)).reshape(2, -1).T @ np.array(BASES[basis])
-    A, mesh = on_lattice(points, SCALE), ScatteredInfluence(points, SCALE)
+    points = np.indices((6, 7)).reshape(2, -1).T @ np.array(LATTICES[basis])
+    A, mesh = lattice_operator(points, SCALE), ScatteredInfluence(points, SCALE)
     dense = DenseInfluence.assemble(points, SCALE)
     for coverage in np.linspace(0.0, 0.2, 150):
         radii = rng.choice([1.0, 0.2], 42) * (rng.random(42) < coverage)
@@ -392,3 +407,123 @@ def test_a_lattice_shrunk_until_its_points_are_off_the_sites_is_refused() -> Non
     assert scene.lattice is None
     with pytest.raises(cr.InputError, match="influence: found lattice"):
         cr.press(scene, approach=1e-6, influence="lattice")
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.integers(0, 2**32 - 1),
+    st.sampled_from([1, 2, 3, 61, 128, 129, 257, 300, 400]),
+    st.sampled_from([1e-150, 1e-9, 1.0, 1e150]),
+    st.sampled_from([1e-150, 1.0, 1e7, 1e150]),
+    st.sampled_from(["disc", "pairs", "grid"]),
+    st.sampled_from(["plain", "uneven", "signs", "zeros"]),
+)
+def test_sums_are_known(
+    seed: int, count: int, length: float, force: float, layout: str, kind: str
+) -> None:
+    """At all scales; with points in pairs, in ties, and with loads of all sizes and signs."""
+    rng = np.random.default_rng(seed)
+    points = rng.uniform(-1, 1, (count, 2))
+    if layout == "grid":
+        points = np.stack(np.divmod(np.arange(count), int(np.ceil(np.sqrt(count)))), axis=1) * 1.0
+    elif layout == "pairs":
+        points[count // 2 :] = points[: count - count // 2] + 1e-6 * points[count // 2 :]
+    high = rng.random(count) * {"uneven": 10.0 ** rng.uniform(-40, 0, count)}.get(kind, 1.0)
+    if kind in ("signs", "zeros"):
+        high *= rng.choice([-1, 1] if kind == "signs" else [0, 0, 1], count)
+    points, high = points * length, high * force
+    loads = Pair(high, high * 2.0**-54 * rng.uniform(-1, 1, count))
+    operator = DenseInfluence.assemble(points, SCALE)
+    found = operator.sums(loads)
+    ctx.dps = 120
+    for row in {0, *rng.integers(0, count, 5).tolist()}:
+        places = exact(points)
+        true = inverse_sum(places, exact(loads.high) + exact(loads.low), places[row])
+        assert abs(middle(found[row]) - true) <= arb(float(found.radius[row]))
+    most = float(operator.apply(np.abs(high)).max()) / SCALE
+    if layout == "grid" and 1e-150 < most < 1e150:
+        assert found.radius.max() <= (1e-25 if kind == "uneven" else 1e-26) * most
+
+
+def test_sums_where_points_are_pairs() -> None:
+    """Of the closest-point geometry as many digits as of summits, and of the true points."""
+    scene = rough("closest")
+    loads = Pair.exact(np.random.default_rng(4).random(len(scene)))
+    found = couple(scene, np.arange(len(scene)), SCALE).sums(loads)
+    ctx.dps = 60
+    points, _, _ = of_scene(scene)
+    for row in range(0, len(scene), 7):
+        true = inverse_sum(points, exact(loads.high), points[row])
+        assert abs(middle(found[row]) - true) <= arb(float(found.radius[row]))
+    assert (found.radius < 1e-26 * found.value).all()
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(2, 40), st.floats(0.3, 4))
+def test_shell_lemma(seed: int, count: int, shape: float) -> None:
+    """A + diag(1 / (pi E* s_i)) is positive semidefinite for any layout."""
+    rng = np.random.default_rng(seed)
+    points = rng.standard_normal((count, 2)) * np.abs(rng.standard_normal((count, 1))) ** shape
+    matrix = inverse_distances(points, points)
+    shifted = matrix + np.diag(shells(DenseInfluence.assemble(points, 1.0)))
+    eigenvalues = np.linalg.eigvalsh(shifted)
+    assert eigenvalues[0] >= -1e-13 * eigenvalues[-1]
+    assert np.linalg.eigvalsh(matrix)[0] < 0  # so the shift is needed
+
+
+def test_upper_bounds_on_sums() -> None:
+    """Also where what is computed is too low, as on a mesh that is coarse enough."""
+    rng = np.random.default_rng(13)
+    points = rng.uniform(0, 1.2, (300, 2))
+    splitting = Splitting(Softened(3, 16, 1.0), 1.0 / 20, 8)
+    product = Product.assemble(points, splitting, np.float64)
+    inverse = inverse_distances(points, points) ** 3
+    too_low = 0
+    for i in range(20):
+        strengths = np.zeros(len(points))
+        strengths[i] = 1.0
+        assert (product.above(strengths) >= inverse[i]).all()
+        relative = product.rounding(strengths).relative
+        low = product.apply(strengths) < (1 - relative) * inverse[i]
+        too_low += int(low[inverse[i] > 0].sum())
+    assert too_low > 100
+
+
+def test_point_error_is_counted() -> None:
+    rng = np.random.default_rng(8)
+    points = jittered(rng)
+    moved = points + rng.choice([-1e-13, 1e-13], points.shape)
+    operator = ScatteredInfluence(points, SCALE, 1e-13)
+    loads = rng.random(len(points))
+    computed = operator.apply(loads)
+    true, rest = inverse_sums(moved[:60], moved, loads, SCALE)
+    assert (np.abs(computed[:60] - true - rest) <= operator.rounding(loads).of(computed)[:60]).all()
+    exactly = ScatteredInfluence(points, SCALE).rounding(loads)
+    assert (operator.rounding(loads).of(computed) >= 10 * exactly.of(computed)).all()
+    far = points + rng.choice([-2e-6, 2e-6], points.shape)
+    rough = ScatteredInfluence(points, SCALE, 2e-6)
+    for power in (1, 2, 3):
+        above = rough.falloff(loads, power)[:60]
+        assert (above >= inverse_sums(far[:60], far, loads, power=power)[0]).all()
+    assert (operator.separations() < ScatteredInfluence(points, SCALE).separations()).all()
+
+
+def test_presses_of_points_in_distant_clusters() -> None:
+    """Newton's method takes as few steps as for one cluster."""
+    rng = np.random.default_rng(10)
+    patch = np.stack(np.meshgrid(np.arange(30), np.arange(30)), -1).reshape(-1, 2)
+    patch = patch + rng.uniform(-0.3, 0.3, patch.shape)
+    far = np.array([[2e4, 1e4]])
+    for points in (np.vstack((patch, patch + far)), np.vstack((patch, far))):
+        scene = on_sphere(points, 10.0, radius=np.inf)
+        assert cr.press(scene, approach=0.02, influence="scattered").iterations <= 8
+
+
+def test_an_interrupted_mesh_is_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else the operator would fall back to a matrix, which may not fit in memory."""
+    operator = ScatteredInfluence(jittered(np.random.default_rng(2)), SCALE)
+    with monkeypatch.context() as patch:
+        patch.setattr(Product, "assemble", Mock(side_effect=KeyboardInterrupt))
+        with pytest.raises(KeyboardInterrupt):
+            operator.apply(np.ones(len(operator)))
+    assert operator._double is not None

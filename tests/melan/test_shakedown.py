@@ -9,12 +9,11 @@ import multiprecision
 import numpy as np
 import pytest
 from flint import arb
-from multiprecision import solve_linear
+from friction_scenes import LARGEST, PAPER, SCENES, shaded
+from multiprecision import solve_linear, tangential_kernel
 from numpy.testing import assert_allclose
-from path_scenes import LARGEST, PAPER, SCENES, shaded
 from scenes import on_sphere, solve_exactly, twins
 from scipy.sparse import csc_array
-from vector_oracle import tangential_kernel
 
 import convexrough as cr
 from convexrough.arrays import Array
@@ -206,7 +205,7 @@ def test_enclosures_hold_the_limit_in_ball_arithmetic(
     kind: Any, along: int, name: str, ratio: float
 ) -> None:
     """Under a force to and fro the state at rest is 0 by symmetry: lambda = min P_i / |q_i|."""
-    scene, load = replace(SCENES[name], material=cr.Material(1.0, ratio)), LARGEST[name]
+    scene, load = replace(SCENES[name][0], material=cr.Material(1.0, ratio)), LARGEST[name]
     amplitudes = swung(kind, 0.5 * load, along)
     found = cr.shakedown(scene, load=load, force_amplitudes=amplitudes, kind=kind)
     loads, shares = exact_shares(scene, load, kind == "vector", along)

@@ -1,5 +1,6 @@
-"""The normal problem: derivatives, bounds, convexity, and contacts with known answers."""
+"""The normal problem: derivatives, bounds, convexity, known answers, and extreme units."""
 
+import itertools
 from functools import partial
 from typing import Any
 
@@ -9,7 +10,16 @@ from flint import arb, ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from scenes import OPERATORS, hexagonal, on_lattice, on_sphere, paper, random_cases, scattered
+from scenes import (
+    MATERIAL,
+    OPERATORS,
+    hexagonal,
+    on_lattice,
+    on_sphere,
+    paper,
+    random_cases,
+    scattered,
+)
 
 import convexrough as cr
 from convexrough.arithmetic.balls import Ball
@@ -22,6 +32,7 @@ from convexrough.normal.problem import NormalProblem
 from convexrough.normal.proved import proved
 from convexrough.normal.refine import refined_loads
 from convexrough.scene.asperities import CUT_DEVIATIONS, largest_tip_radius
+from convexrough.scene.lattice import Lattice
 from convexrough.scene.scene import reach
 from convexrough.solvers import Newton
 from convexrough.solvers.newton import Pressing
@@ -154,3 +165,37 @@ def test_coefficients_are_within_their_bounds_of_k(radii: tuple[float, float]) -
             off = arb(found.mid.high[i]) + arb(found.mid.low[i]) - true
             assert abs(float(off)) <= found.radius[i] <= 1e-29 * found.mid.high[i]
             assert found.radius[i] > 0
+
+
+HEXAGON = cr.Asperities.hexagonal(spacing=0.25, tip_radius=1.0, within=0.5).positions
+
+
+@pytest.mark.parametrize("exponent", [-59, -70, -140])
+def test_contact_points_too_near_to_each_other(exponent: int) -> None:
+    """Reached by "closest" from positions of a good size: no status, and no search without end."""
+    points = HEXAGON * 10.0**exponent
+    lattice = Lattice.through(points)
+    assert (lattice is None) == (exponent < -59)
+    if exponent < -59:
+        positions = HEXAGON * 1e-30
+        asperities = cr.Asperities(positions, 10.0 ** min(-40 - exponent, 59))
+        with pytest.raises(cr.InputError, match=r"at a distance of .* choose other units"):
+            cr.Scene(1e-10, asperities, MATERIAL, geometry="closest")
+
+
+@pytest.mark.sample(1)
+@pytest.mark.parametrize("control", ["approach", "load"])
+@pytest.mark.parametrize("geometry", ["summit", "closest"])
+@pytest.mark.parametrize("modulus", [1e-60, 1.0, 1e60])
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of float64's range, which is the point
+def test_extremes_are_answered_or_refused(modulus: float, geometry: Any, control: str) -> None:
+    """Never ZeroDivisionError: of sums in the bound on the approach, above all."""
+    sizes = (1e-60, 1e-20, 1e20, 1e60)
+    for radius, tip, size, value in itertools.product(sizes, sizes, (1e-57, 1e57), sizes):
+        try:
+            asperities = cr.Asperities(HEXAGON * size, tip)
+            scene = cr.Scene(radius, asperities, cr.Material(modulus, 0.3), 0.5, geometry)
+            contact = cr.press(scene, **{control: value})
+        except (cr.InputError, cr.SolverError):
+            continue
+        assert ((contact.status != "contact") | (contact.loads > 0)).all()

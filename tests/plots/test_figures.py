@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 from figure_checks import discs, fits, texts
+from friction_scenes import LARGEST, ONE, PAPER, follow
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from numpy.testing import assert_allclose
-from path_scenes import LARGEST, ONE, PAPER, follow
 from scenes import PAPER_APPROACH, hexagonal, on_sphere, paper, rough, steel
 
 import convexrough as cr

@@ -1,15 +1,21 @@
-"""The checker by itself: what it imports, its arithmetic, its answers."""
+"""Honest proofs, true by the 50-digit reference; the checker; forged proof files.
+
+Whatever the checker accepts is true by the reference.
+"""
 
 import ast
 import json
 import math
+import os
 import random
 import re
 import subprocess
 import sys
+from collections import Counter
 from copy import deepcopy
 from dataclasses import replace
 from fractions import Fraction
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -18,12 +24,13 @@ import numpy as np
 import pytest
 import scenes
 from flint import arb, ctx
-from multiprecision import quotient
-from path_scenes import ring, shaded
+from friction_scenes import ring, shaded
+from multiprecision import false_claims, quotient
 
 import convexrough as cr
 from convexrough import checker
 from convexrough.checker import Interval, Refused
+from convexrough.proof import prove
 
 SOURCE = Path(checker.__file__)
 
@@ -159,6 +166,8 @@ def test_scenes_that_are_too_large_impossible_or_of_another_hash_are_refused(doc
     negative = (-1.0).hex()
     wrong(document, "is not positive", sha256="fits", scene__sphere_radius=negative)
     wrong(document, "is not positive", sha256="fits", scene__sphere_radius=["inf", negative])
+    for radius in (["inf"], ["inf", "0x1.8p+0"], [["inf", "inf"]], "nan", "-inf"):
+        wrong(document, "radius", checker.Unreadable, sha256="fits", scene__sphere_radius=radius)
 
 
 def test_boxes_and_shells_that_prove_nothing_are_refused(document: Any) -> None:
@@ -354,3 +363,262 @@ def test_two_solutions_are_both_proved_and_neither_is_the_only_one() -> None:
         document["argument"] |= {"box": [(1.01 * a).hex()] * 2}
         with pytest.raises(Refused, match="breaks down"):
             checker.prove(document)
+
+
+def judged(proof: Any) -> Any:
+    """The claims of a proof that the checker accepts and the oracle finds true."""
+    document = json.loads(json.dumps(proof.document))
+    assert checker.check(document) == proof.proved
+    assert false_claims(document) == []
+    return document["claims"]
+
+
+def both_controls(scene: cr.Scene, approach: float) -> list[cr.Contact]:
+    contact = cr.press(scene, approach=approach)
+    return [contact, cr.press(scene, load=contact.load)] if contact.load else [contact]
+
+
+def small(name: str, friction: float | None = None) -> tuple[cr.Scene, float]:
+    """The inner asperities of a named scene, of which some touch: exact arithmetic takes time."""
+    scene, approach = scenes.EVERY[name]
+    a = scene.asperities
+    inner = cr.Asperities(a.positions[:19], a.tip_radii[:19], a.heights[:19])
+    return replace(scene, asperities=inner, friction=friction), 0.4 * approach
+
+
+def width(bounds: list[str]) -> float:
+    low, high = (Fraction(float.fromhex(text)) for text in bounds)
+    return float(high - low)
+
+
+@pytest.mark.sample(4)
+@pytest.mark.parametrize("name", scenes.EVERY)
+def test_named_scenes_are_proved_and_sharply(name: str) -> None:
+    for contact in both_controls(*small(name)):
+        claims = judged(contact.proof())
+        assert claims["scope"] == "global"
+        assert claims["status"] == list(contact.status)
+        for bounds in claims["loads"]:  # neighbours among float64 numbers: no bound is sharper
+            assert width(bounds) <= np.spacing(float.fromhex(bounds[0]))
+
+
+@pytest.mark.sample(2)
+@pytest.mark.parametrize("name", ["paper", "rough, closest", "rough on cylinder, closest"])
+def test_friction_states_and_losses_are_proved(name: str) -> None:
+    for contact in both_controls(*small(name, friction=0.5)):
+        forces = np.array([1e-6, 0.37, 0.99]) * 0.5 * contact.load
+        states = [cr.shear(contact, force=float(force)) for force in forces]
+        claims = judged(contact.proof(sheared=states))
+        for state, claim in zip(states, claims["shear"], strict=True):
+            assert claim["status"] == list(state.status)
+            low, high = (float.fromhex(text) for text in claim["loss"])
+            assert low <= cr.cycle(contact, maximum=state.force).loss <= high
+            assert claim["order"] == "proved"
+            assert width(claim["loss"]) < (1e-15 if state.force > forces[0] else 2e-7) * high
+
+
+def test_random_scenes() -> None:
+    """Where there is a certificate there is a proof, and no status of it is lost."""
+    proved = 0
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        make = scenes.scattered if seed % 2 else scenes.on_lattice
+        count, crowding = int(rng.integers(1, 13)), float(rng.uniform(0.05, 2.0))
+        roughness = float(rng.choice([0.0, 0.1, 0.5, 2.0]))
+        for contact in both_controls(*make(seed, count, crowding, roughness)):
+            if contact.certificate.scope == "none":
+                continue
+            try:
+                proof = contact.proof()
+            except cr.ProofError:  # the certificate alone has a status for crowded contacts
+                assert contact.certificate.fixed_open or contact.crowding > 1
+                continue
+            claims = judged(proof)
+            decided = contact.status != "undecided"
+            assert (np.array(claims["status"]) == contact.status)[decided].all()
+            proved += 1
+    assert proved > 8
+
+
+def test_the_bound_holds_where_the_energy_is_flattest() -> None:
+    """Two equal contacts, as near to the end of convexity as is provable, off in opposite ways."""
+    a, apart = 0.75 * np.pi / 2, 1.0
+    scene = scenes.on_sphere([[0, 0], [apart, 0]], 1e3, radius=1e30)
+    approach = a**2 / 1e3 * (1 + 4 * a / (3 * np.pi * apart))
+    loads = cr.press(scene, approach=approach).loads
+    claims = judged(prove(scene, loads * [1 + 1e-6, 1 - 1e-6], approach=approach))
+    assert claims["scope"] == "global"
+
+
+def test_crowded_contacts_are_proved_with_others_held_open() -> None:
+    """Where the certificate has a status there is a proof, by overlapping shells or by Cholesky."""
+    for sampled in ((9, 12, 3.0, 0.5), (2, 40, 2.5, 0.3), (9, 12, 4.0, 0.0)):
+        scene, approach = scenes.scattered(*sampled)
+        contact = cr.press(scene, approach=approach)
+        assert contact.crowding > 1
+        claims = judged(contact.proof())
+        assert claims["scope"] == contact.certificate.scope == "local"
+        assert claims["status"] == list(contact.status)
+
+
+FORGERIES = int(os.environ.get("CONVEXROUGH_FORGERIES", "30"))
+
+Place = tuple[Any, ...]
+
+
+@cache
+def honest() -> list[Any]:
+    """Small proofs of every kind: controls, geometries, arguments, scopes, order."""
+    heights = [0, -2e-6, -4e-6, -6e-6, -1e-5, -1.5e-5, -3e-5]  # the last is open
+    seven = cr.Asperities(0.0025 * ring(6), 0.02, heights)
+    proofs = []
+    for geometry, friction in (("summit", 0.5), ("closest", None)):
+        scene = cr.Scene(1.0, seven, scenes.MATERIAL, friction=friction, geometry=geometry)
+        contact = cr.press(scene, approach=2e-5)
+        for each in (contact, cr.press(scene, load=contact.load)):
+            forces = [0.3 * friction * each.load, 0.9 * friction * each.load] if friction else []
+            proofs.append(each.proof(sheared=[SimpleNamespace(force=Q) for Q in forces]))
+    lifted = cr.press(shaded(), load=2.96)
+    proofs.append(lifted.proof(sheared=[SimpleNamespace(force=0.4 * lifted.load)]))
+    loads = lifted.loads * (1 + 1e-3 * (np.arange(6) == 0))
+    proofs.append(prove(lifted.scene, loads, load=2.96))
+    for sampled in ((3, 5, 1.9, 0.5), (9, 6, 2.2, 0.1)):
+        crowded, approach = scenes.scattered(*sampled)
+        proofs.append(cr.press(crowded, approach=approach).proof())
+    documents = [json.loads(json.dumps(proof.document)) for proof in proofs]
+    by_cholesky = deepcopy(documents[-1])
+    by_cholesky["argument"] |= {"shells": None, "convexity_number": (0.999).hex()}
+    documents.append(by_cholesky)
+    return documents
+
+
+def leaves(tree: Any, at: Place = ()) -> list[Place]:
+    """Where the strings are."""
+    if isinstance(tree, str):
+        return [at]
+    items = tree.items() if isinstance(tree, dict) else enumerate(tree or ())
+    return [path for key, value in items for path in leaves(value, (*at, key))]
+
+
+def look(tree: Any, path: Place) -> Any:
+    for key in path:
+        tree = tree[key]
+    return tree
+
+
+def put(tree: Any, path: Place, value: Any) -> None:
+    look(tree, path[:-1])[path[-1]] = value
+
+
+def a_number(rng: random.Random, document: Any, *under: str) -> Place:
+    start = look(document, under)
+    return rng.choice([(*under, *p) for p in leaves(start) if "0x" in look(start, p)])
+
+
+def one_number(rng: random.Random, document: Any) -> Any:
+    part = rng.choice([(), ("claims",), ("scene",), ("prescribed",)])
+    path = a_number(rng, document, *part)
+    if rng.random() < 0.2:
+        odd = ["nan", "0x1.8p+99999", "1e-3", "", None, 1, [], {}, (5e-324).hex(), (1e150).hex()]
+        put(document, path, rng.choice([*odd, (0.0).hex(), (-1.0).hex()]))
+        return document
+    value = float.fromhex(look(document, path))
+    change = 2.0 ** rng.uniform(-60, 2) * rng.choice([1, -1])
+    changed = value * (1 + change) if value else change * 1e-9
+    if changed == value:
+        changed = float(np.nextafter(value, rng.choice([-np.inf, np.inf])))
+    put(document, path, changed.hex())
+    return document
+
+
+def tighter_bound(rng: random.Random, document: Any) -> Any:
+    """By less than its width: what is left may still hold the truth, and may not be proved."""
+    path = a_number(rng, document, "claims")[:-1]
+    low, high = (float.fromhex(text) for text in look(document, path))
+    cut = rng.choice([0.01, 0.3, 0.6, 0.99]) * (high - low)
+    low, high = rng.choice([(low + cut, high), (low, high - cut), (high, high), (high, low)])
+    put(document, path, [low.hex(), high.hex()])
+    return document
+
+
+def one_status(rng: random.Random, document: Any) -> Any:
+    claimed = ["contact", "open", "undecided", "sliding", "partial", "global", "local", ""]
+    claimed += ["proved", "proved for one step"]
+    claims = document["claims"]
+    path = rng.choice([p for p in leaves(claims) if look(claims, p) in claimed])
+    put(claims, path, rng.choice(claimed))
+    return document
+
+
+def swapped_part(rng: random.Random, document: Any) -> Any:
+    """All that another proof claims, or its scene, what it prescribes, its friction."""
+    other = deepcopy(rng.choice(honest()))
+    part = rng.choice(["scene", "claims", "prescribed", "sheared"])
+    document[part] = other[part]
+    if part == "sheared":
+        document["claims"]["shear"] = other["claims"]["shear"]
+    return document
+
+
+def changed_box(rng: random.Random, document: Any) -> Any:
+    factor = 2.0 ** (rng.uniform(-3, 3) * rng.choice([1, 0.01]))
+    which = rng.choice(["box", "shells", "box", "one", "theta"])
+    argument = document["argument"]
+    if which == "theta" or (which == "shells" and argument["shells"] is None):
+        argument["convexity_number"] = rng.uniform(0, 1.2).hex()
+    elif which == "one":
+        put(argument["box"], (rng.randrange(len(argument["box"])),), (0.0).hex())
+    else:
+        argument[which] = [(factor * float.fromhex(text)).hex() for text in argument[which]]
+    return document
+
+
+def changed_radii(rng: random.Random, document: Any) -> Any:
+    place = rng.choice([document["pressed"], *(each["held"] for each in document["sheared"])])
+    radii = place["radii"]
+    radii[rng.randrange(len(radii))] = rng.choice([[(0.0).hex()], rng.choice(radii), []])
+    return document
+
+
+FORGED = [one_number, tighter_bound, one_status, swapped_part, changed_box, changed_radii]
+
+
+def forged(rng: random.Random) -> tuple[str, bytes]:
+    """How, and the file: one or two forgeries, mostly under a hash that fits, at times torn."""
+    document, names = deepcopy(rng.choice(honest())), []
+    for _ in range(rng.choice([1, 1, 1, 2])):
+        forge = rng.choice(FORGED)
+        try:
+            document = forge(rng, document)
+        except (LookupError, TypeError, ValueError, AttributeError):
+            continue  # the second finds no place after the first
+        names.append(forge.__name__)
+    if rng.random() < 0.8 and {"scene", "prescribed", "sha256"} <= set(document):
+        document["sha256"] = checker.digest(document["scene"], document["prescribed"])
+        names.append("hash")
+    contents = json.dumps(document).encode()
+    if rng.random() < 0.1:
+        names.append("torn")
+        place = rng.randrange(len(contents))
+        contents = rng.choice([contents[:place], contents[:place] + contents[place + 1 :]])
+    return "+".join(names), contents
+
+
+def judge(seed: int, folder: Path) -> str:
+    """What the checker says of a forgery; the forgery must be true if it accepts."""
+    rng = random.Random(seed)
+    how, contents = forged(rng)
+    path = folder / "proof.json"
+    path.write_bytes(contents)
+    status = checker.main([str(path)])
+    if status == 0:
+        document = json.loads(contents)
+        assert not false_claims(document), (seed, how)
+    assert status in (0, 1, 2)
+    return ("accepted", "refused", "unreadable")[status]
+
+
+def test_no_forgery_that_is_accepted_claims_something_false(tmp_path: Path) -> None:
+    outcomes = Counter(judge(seed, tmp_path) for seed in range(FORGERIES))
+    assert all(outcomes[what] > FORGERIES / 50 for what in ("accepted", "refused", "unreadable"))
+    print(outcomes)

@@ -1,4 +1,7 @@
-"""The command line as its users meet it: output, files, exit status; processes in test_process."""
+"""The command line as its users meet it: output, files, exit status; and a stage of one's own.
+
+The stage of docs/architecture.md: one file and one registration give all that a stage has.
+"""
 
 import json
 import re
@@ -11,6 +14,7 @@ from scene_files import EVERYTHING, FRICTION, WITHIN, rows, scene_text
 
 import convexrough as cr
 from convexrough.run.scene_file import read_scene
+from convexrough.run.stages import STAGES
 
 
 def test_new_overwrites_nothing(command: Any, tmp_path: Path) -> None:
@@ -100,6 +104,8 @@ def test_a_run_says_what_the_package_says(run: Any, command: Any) -> None:
 
     file = read_scene("a.toml")
     contact = file.press()
+    assert contact.certificate.convexity_number == pytest.approx(0.504, abs=5e-4)
+    assert contact.model_error == pytest.approx(0.002, abs=5e-4)
     for name in ("scope", "convexity_number", "load_error", "gap_error"):
         assert proof[name] == getattr(contact.certificate, name)
     limit = 0.5 * contact.load
@@ -179,3 +185,45 @@ def test_what_new_comments_out_is_valid_too(command: Any, tmp_path: Path) -> Non
     outcome = command("run", "all.toml", "--no-figures")
     assert outcome.status == 0
     assert "approach          5e-05 mm\n" in outcome.out
+
+
+PAGE = Path(__file__).parents[2] / "docs" / "architecture.md"
+MORE = FRICTION + "[onset]\n"
+
+
+@pytest.fixture
+def added(monkeypatch: pytest.MonkeyPatch) -> None:
+    (block,) = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.S)
+    assert block.count("\n") <= 45
+    monkeypatch.setitem(STAGES, "onset", STAGES["shear"])  # taken out again at the end
+    exec(compile(block, str(PAGE), "exec"), {"__name__": "onset"})
+
+
+@pytest.mark.usefixtures("added")
+def test_a_stage_is_computed_written_and_printed(run: Any) -> None:
+    ran = run(scene_text(more=MORE))
+    assert (ran.status, ran.err) == (0, "")
+    said = json.loads(Path("a-results/summary.json").read_text())["onset"]
+    assert re.search(rf"^onset of sliding\nquantile +Q/\(fP\)\n +0 +{said[0]['onset']:.7g}$",
+                     ran.out, re.M)  # fmt: skip
+    file = cr.read_scene("a.toml")
+    contact = file.press()
+    onsets = cr.onset_of_sliding(contact) / (0.5 * contact.load)
+    written = [float(row["onset"]) for row in rows("a-results/onset.csv")]
+    assert written == pytest.approx(onsets, nan_ok=True)
+    assert said[0] == {"quantile": 0.0, "onset": min(written)}
+    (*_, result) = file.compute(contact)
+    assert result.certified
+    assert "newton; 37 contact" in result._repr_html_()
+    assert list(result.to_dataframe()["onset"]) == pytest.approx(onsets, nan_ok=True)
+
+
+@pytest.mark.usefixtures("added")
+def test_mistakes_of_a_stage_are_told(run: Any) -> None:
+    for more, said in (
+        (MORE + "quantils = [1]", '[onset] quantils: unknown key, did you mean "quantiles"?'),
+        (MORE + "quantiles = [2.0]", "[onset] quantiles[0]: found 2.0, expected a number from 0"),
+        (MORE.replace("onset", "onst"), '[onst]: unknown table, did you mean "onset"?'),
+        ("[onset]", "[friction]: missing table, needed with [onset]"),
+    ):
+        assert run(scene_text(more=more)).refuses(said)

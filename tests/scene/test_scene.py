@@ -1,4 +1,4 @@
-"""Material, asperities, scene: geometry by independent means, two bodies, and bad values."""
+"""Materials, asperities, and bases that are no sphere: by independent means and 50 digits."""
 
 from dataclasses import replace
 from typing import Any
@@ -8,10 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from scenes import paper
+from scenes import MATERIAL, paper
 
 import convexrough as cr
+from convexrough.normal.problem import NormalProblem
 from convexrough.scene.asperities import CUT_DEVIATIONS, largest_tip_radius
+from convexrough.scene.scene import reach
 from convexrough.sphere import mindlin
 from convexrough.vector_shear.problem import FrictionProblem
 
@@ -19,13 +21,9 @@ STEEL, ALUMINIUM = cr.Material.from_youngs(210e9, 0.3), cr.Material.from_youngs(
 BODIES = st.builds(cr.Material.from_youngs, st.floats(1e-3, 1e12), st.floats(0.0, 0.5))
 
 
-@given(BODIES)
-def test_two_bodies_of_one_kind_are_that_kind(body: cr.Material) -> None:
-    assert cr.Material.pair(body, body) == body
-
-
 @given(BODIES, BODIES)
 def test_compliances_add_up(one: cr.Material, other: cr.Material) -> None:
+    assert cr.Material.pair(one, one) == one
     both, E, G, nu = cr.Material.pair(one, other), *_constants(one, other)
     compliance = ((1 - nu**2) / E).sum()
     assert both.contact_modulus == pytest.approx(1 / compliance, rel=1e-14)
@@ -83,3 +81,40 @@ def test_random_heights_and_radii() -> None:
     assert both.tip_radii.std() / both.tip_radii.mean() == pytest.approx(0.3, rel=0.05)
     assert both.tip_radii.max() <= largest_tip_radius(2.0, 0.3)
     assert np.abs(both.heights).max() <= CUT_DEVIATIONS * 0.1
+
+
+INF = float("inf")
+GEOMETRIES = ("summit", "closest")
+
+
+@pytest.mark.sample(2)
+@pytest.mark.parametrize("within", [0.03, 0.12])  # by one start of Newton's method and the other
+@pytest.mark.parametrize("control", [{"load": 2e-6}, {"approach": 2e-6}, {"approach": -5e-7}])
+def test_many_under_a_flat_base(within: float, control: Any) -> None:
+    regular = cr.Asperities.square(spacing=0.0035, tip_radius=0.02, within=within)
+    rough = regular.roughened(height_std=1e-6, tip_radius_cv=0.1, seed=2)
+    scene = cr.Scene(INF, rough, MATERIAL, friction=0.4, geometry="summit")
+    contact = cr.press(scene, **control)
+    assert contact.certificate.scope == "global"
+    assert not (contact.status == "undecided").any()
+    assert contact.certificate.load_error <= 1e-12 * contact.loads.max()
+    shallow = contact.loads[rough.heights < -contact.approach]
+    assert (shallow == 0).all()
+    if "load" in control:
+        problem = NormalProblem.assemble(scene, load=contact.load)
+        assert contact.approach <= problem.approach_bound * problem.units.length
+    state = cr.shear(contact, force=0.1 * contact.load)
+    assert state.certificate.scope == "global"
+
+
+@pytest.mark.parametrize("geometry", GEOMETRIES)
+def test_reach(geometry: Any) -> None:
+    """No asperity beyond it could touch, along the axis where the base bends away least."""
+    given: Any = dict(tip_radius=0.1, height=1e-5, geometry=geometry)
+    edge = reach(1e-4, sphere_radius=(0.5, 2.0), **given)
+    for factor, sign in ((0.999, 1), (1.001, -1)):
+        asperity = cr.Asperities([[0.0, edge * factor]], 0.1, 1e-5)
+        scene = cr.Scene((0.5, 2.0), asperity, MATERIAL, geometry=geometry)
+        assert np.sign(1e-4 + scene.offsets[0]) == sign
+    assert reach(1e-4, sphere_radius=INF, **given) == INF
+    assert reach(-1e-4, sphere_radius=(1.0, INF), **given) == 0

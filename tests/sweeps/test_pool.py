@@ -1,22 +1,29 @@
-"""The same table whoever computes it: processes, threads, Dask, in any order and any batches."""
+"""The same table whoever computes it, in any order and batches, and whatever is killed."""
 
 import logging
 import multiprocessing
 import os
 import random
+import shutil
 import signal
+import subprocess
+import sys
+import time
 from collections.abc import Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+import psutil
 import pytest
-from sweep_files import same, sweeping, swept, tables
+from scene_files import same, sweeping, swept, tables, toml
 
 import convexrough as cr
 from convexrough.progress import logged
 from convexrough.sweeps import plan
+from convexrough.sweeps.folder import open_folder
 from convexrough.sweeps.plan import plan_of
 from convexrough.sweeps.sweep import dask, run
 
@@ -163,3 +170,163 @@ def test_a_scheduler_that_does_not_answer() -> None:
         pass
     with pytest.raises(ValueError, match="No client"):
         distributed.default_client()
+
+
+CONTENTS = tables(sweep={"seeds": 16, "measure": ["load"]})
+SCENES, PARTS = 64, 32
+
+
+@pytest.fixture(scope="module")
+def whole() -> cr.SweepTable:
+    return swept(CONTENTS)
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    (tmp_path / "a.toml").write_text(toml(CONTENTS))
+    return tmp_path
+
+
+def kills(request: pytest.FixtureRequest) -> int:
+    return 30 if request.config.option.full else 1
+
+
+def rows(folder: Path) -> int:
+    """How many scenes are there; each part of them whole."""
+    found = open_folder(folder / "a-sweep")
+    return sum(len(found.read(part)["scene"]) for part in found.parts())
+
+
+def resumed(folder: Path) -> cr.SweepTable:
+    return swept(folder / "a.toml", out=folder / "a-sweep", resume=True)
+
+
+def scripted(folder: Path, script: str, *arguments: str) -> subprocess.Popen[str]:
+    """A script, which needs no guard although its workers are new interpreters."""
+    (folder / "script.py").write_text(script)
+    return subprocess.Popen(
+        [sys.executable, "script.py", *arguments], cwd=folder, stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE, text=True, start_new_session=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )  # fmt: skip
+
+
+#: The command, which is killed when it has written its n-th file and is about to name it.
+KILLED = """
+import os, signal, sys
+import psutil
+from convexrough.cli import main
+left, replace = int(sys.argv[1]), os.replace
+def name(*paths):
+    global left
+    left -= 1
+    if left == 0:
+        print(*(each.pid for each in psutil.Process().children()), flush=True)
+        os.kill(os.getpid(), signal.SIGKILL)
+    replace(*paths)
+os.replace = name
+main(["sweep", "a.toml", "--workers", "1", "--resume"])
+"""
+
+
+def test_the_command_is_killed_at_any_moment(request: Any, file: Path, whole: Any) -> None:
+    moments = random.Random(request.config.option.seed)
+    known = killed = 0
+    while killed < kills(request):
+        process = scripted(file, KILLED, str(moments.randint(1, PARTS // 2)))
+        children, said = process.communicate()
+        assert "Traceback" not in said
+        if process.returncode == 0:  # complete, so the next one begins anew
+            shutil.rmtree(file / "a-sweep")
+            known = 0
+            continue
+        killed += process.returncode == -signal.SIGKILL
+        for child in map(int, children.split()[-1:]):  # workers end with those who started them
+            while psutil.pid_exists(child) and psutil.Process(child).status() != "zombie":
+                time.sleep(0.01)
+        if (file / "a-sweep/manifest.json").exists():
+            assert rows(file) >= known
+            known = rows(file)
+    assert same(resumed(file), whole)
+    assert {path.suffix for path in (file / "a-sweep/parts").iterdir()} == {".parquet"}
+
+
+def test_workers_are_killed_at_any_moment(request: Any, file: Path, whole: Any) -> None:
+    """Whoever computed dies; where that happens to one batch twice, --resume computes it."""
+    chance = random.Random(request.config.option.seed)
+    left = kills(request)
+
+    def kill(record: logging.LogRecord) -> None:
+        nonlocal left
+        workers = []
+        for each in psutil.Process().children():
+            with suppress(psutil.NoSuchProcess):  # it may just have ended
+                workers += [each] if "spawn_main" in " ".join(each.cmdline()) else []
+        if left and workers and "of 64 scenes" in record.getMessage():
+            chance.choice(workers).kill()
+            left -= 1
+
+    while True:
+        with suppress(cr.WorkerError), logged(kill):
+            cr.sweep(file / "a.toml", workers=1, out=file / "a-sweep", resume=True)
+        if rows(file) == SCENES and left:
+            shutil.rmtree(file / "a-sweep")
+        elif rows(file) == SCENES:
+            break
+    assert left == 0
+    assert same(cr.open_sweep(file / "a-sweep"), whole)
+
+
+#: An interrupt is an interrupt, whatever started the tests.
+INTERRUPTIBLE = """
+import signal, sys
+from convexrough.cli import main
+signal.signal(signal.SIGINT, signal.default_int_handler)
+sys.exit(main(["sweep", "a.toml", "--workers", "1"]))
+"""
+
+
+@pytest.mark.sample(1)
+@pytest.mark.parametrize("event", ["a-sweep/manifest.json", "a-sweep/parts/*.parquet"])
+def test_an_interrupt_keeps_what_was_computed(tmp_path: Path, event: str) -> None:
+    """As soon as there is a folder, and as soon as there is a part; the terminal tells workers."""
+    (tmp_path / "a.toml").write_text(toml(tables(sweep={"seeds": 1000, "measure": ["load"]})))
+    process = scripted(tmp_path, INTERRUPTIBLE)
+    while not list(tmp_path.glob(event)):
+        assert process.poll() is None
+        time.sleep(0.01)
+    children = psutil.Process(process.pid).children()
+    os.killpg(process.pid, signal.SIGINT)
+    _, said = process.communicate()
+    psutil.wait_procs(children)
+    kept = len(cr.open_sweep(tmp_path / "a-sweep"))
+    more = "; the same command with --resume computes the rest" if kept else ""
+    kept_here = f"{kept:,} of 4,000 scenes are kept in a-sweep{more}"
+    assert (process.returncode, said) == (130, f"convexrough: interrupted: {kept_here}\n")
+    assert kept > 0 or "parquet" not in event
+    assert not list((tmp_path / "a-sweep/parts").glob(".*"))
+
+
+#: A file that may not grow fails as one on a full disk does: in the middle of what is written.
+FULL = """
+import resource
+import convexrough as cr
+from convexrough.progress import logged
+from scene_files import swept
+def fill(record):
+    if "of 64 scenes" in record.getMessage():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1000, resource.RLIM_INFINITY))
+try:
+    with logged(fill):
+        swept("a.toml", out="a-sweep")
+except cr.FileError as error:
+    print(error)
+"""
+
+
+def test_a_full_disk(file: Path, whole: cr.SweepTable) -> None:
+    out, said = scripted(file, FULL).communicate()
+    assert (said, out.endswith("cannot be written: File too large\n")) == ("", True), out
+    assert rows(file) == SCENES // PARTS
+    assert not list((file / "a-sweep/parts").glob(".*"))
+    assert same(resumed(file), whole)

@@ -4,7 +4,6 @@ import gzip
 import io
 import json
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
@@ -201,17 +200,6 @@ READ: dict[str, tuple[Any, ...]] = {
 }  # fmt: skip
 
 
-def headed(header: str, scale: float = 1.0) -> Callable[[Case], Columns]:
-    """A table with another header, and places in another unit."""
-
-    def made(case: Case) -> Columns:
-        x, y, _ = header.split(" ")
-        table = case.table(header)
-        return table | {x: scale * table[x], y: scale * table[y]}
-
-    return made
-
-
 #: What a file holds; its name and the options it is read with, or ""; and all that is said.
 REFUSED: dict[str, tuple[Any, ...]] = {
     "another unit below the header": (
@@ -237,13 +225,15 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "a unit behind the names": (
         lambda case: lines(case.table()).replace("load\n", "load # kN\n", 1), "",
         "comments: found ' kN', expected units in the header"),
-    "no unit": (headed("x y load\xa0[Newtn]"), "", "load: found 'Newtn'", "--scale load=1"),
-    "y in mm": (headed("x\xa0[m] y\xa0[mm] load"), "",
+    "no unit": (lambda case: case.table("x y load\xa0[Newtn]"), "",
+                "load: found 'Newtn'", "--scale load=1"),
+    "y in mm": (lambda case: case.table("x\xa0[m] y\xa0[mm] load"), "",
                 "column y: found mm, expected m", "--scale y=0.001", "convert = true"),
     "pressure in MPa": (lambda case: case.pixels("x y pressure\xa0[MPa]"), "",
                         "column pressure: found MPa, expected N/m²", "--scale pressure=1000000"),
-    "places in mm": (headed("x y load", 1e3), "",
-                     "times as large as", "--scale x=0.001 --scale y=0.001"),
+    "places in mm": (
+        lambda case: case.table(x=1e3 * PLACES[case.order, 0], y=1e3 * PLACES[case.order, 1]), "",
+        "times as large as", "--scale x=0.001 --scale y=0.001"),
     "pixels shifted": (lambda case: case.pixels() | {"x": case.pixels()["x"] + 2e-4}, "",
                        "all are shifted by about [0.0001997, 9e-08], expected x, y rela"),
     "an array turned": (lambda case: case.table("y x load") | {"y": -PLACES[case.order, 0]}, "",
