@@ -172,9 +172,10 @@ def _shift(problem: FrictionProblem, eta: Array, turned: Array, missing: float) 
 def _excess(problem: FrictionProblem, state: VectorState, total: Ball, errors: Array) -> float:
     """Bound on E(q) - E(q*) for the energy E; infinite if X is, or if E is not proved convex.
 
-    It is the sum of e_i |q_i - q*_i|, plus a term for the error of the total, and holds if
-    |q_i| <= P_i up to rounding. e_i is the distance of X - (B q)_i from the deflection of q_i or,
-    where |q_i| = P_i, from the ray of all eta with this force.
+    It is the sum of e_i |q_i - q*_i|, plus a term for the error of the total and, for the rounding
+    of |q_i| = P_i, the sum of slip times P_i - |q_i|. It holds if |q_i| <= P_i up to rounding. e_i
+    is the distance of X - (B q)_i from the deflection of q_i or, where |q_i| = P_i, from the ray of
+    all eta with this force.
 
     errors : (n,) bounds on |q - q*|
     """
@@ -192,8 +193,9 @@ def _excess(problem: FrictionProblem, state: VectorState, total: Ball, errors: A
     sums = own + problem.influence.matrix @ size + float(np.hypot(*X))
     off = off + steep + (SUM_ROUNDOFFS * ROUNDOFF + problem.product_error) * sums
     moved = np.fmin(errors, length + problem.most)
+    lacking = np.abs(problem.loads - length) + 4 * ROUNDOFF * problem.loads
     short = (Ball.exact(np.ascontiguousarray(q.T)).sum() - total) * X
-    return float(off @ moved + short.size.sum()) * (1 + SAFETY)
+    return float(off @ moved + (nearest - own) @ lacking + short.size.sum()) * (1 + SAFETY)
 
 
 def _by_exhaustion(problem: FrictionProblem, state: VectorState, total: Ball) -> VectorBounds:

@@ -280,3 +280,29 @@ def test_more_problems_than_a_chunk_of_numbers() -> None:
     loads = np.linspace(1e-8, 3e-7, 2**14 + 16)
     found = cr.press_many([scene] * len(loads), load=loads)
     np.testing.assert_allclose(found.asperity_loads.sum(axis=1), loads, rtol=1e-12)
+
+
+def test_a_loop_within_the_loop() -> None:
+    """Slip, loss and derivatives are those of the whole path, not of its outer loop."""
+    asperities, P = cr.Asperities([[0, 0], [1, 0]], 1.0, heights=[0, -0.002]), 1e-3
+    scene = cr.Scene(np.inf, asperities, cr.Material(1.0, 0.3), FRICTION)
+    forces = FRICTION * P * np.array([0.95, -0.95, 0.94, -0.94])
+
+    def settled(scene: cr.Scene) -> cr.Cycle:
+        return cr.steady(scene, loads=[P] * 4, forces=forces)
+
+    cycle = settled(scene)
+    past = cr.history(cr.press(scene, load=P), forces=np.tile(forces, 3))
+    slips = past.slips[3:8, 1]
+    forward = np.maximum(np.diff(slips), 0.0).sum()
+    assert [*cycle.status] == ["partial", "sliding"]
+    assert cycle.slips[1] == pytest.approx(forward, rel=1e-13)
+    assert cr.fretting(cycle).gross_slip_amplitudes[1] == pytest.approx(
+        np.ptp(slips) / 2, rel=1e-13
+    )
+    assert np.isnan([cycle.smooth_normalised, cycle.balance_defect]).all()
+    assert 0 < 1 - cycle.loop(400).area / cycle.loss < 1e-4
+    gradient = cycle.gradient()
+    assert gradient.value == pytest.approx(cycle.loss, rel=1e-15)
+    less, more = (settled(replace(scene, friction=FRICTION * s)).loss for s in (1 - 1e-6, 1 + 1e-6))
+    assert gradient.friction == pytest.approx((more - less) / (2e-6 * FRICTION), rel=1e-8)

@@ -241,6 +241,28 @@ def test_where_order_fails() -> None:
         assert_allclose(bristles.forces, fine.asperity_forces[k], atol=5e-3 * Q.max())
 
 
+def test_without_order_a_cycle_is_repeated_until_its_loss_settles() -> None:
+    scene = shaded()
+    load = cr.press(scene, approach=1.4).load
+    loads, forces = load * np.array([1.0, 0.7]), load * np.array([0.2, 0.32])
+    cycle = cr.steady(scene, loads=loads, forces=forces)
+    assert cycle.order == "fails"
+    many = [*range(2)] * 9
+    losses = cr.load_path(scene, loads=loads[many], forces=forces[many], general_steps=64).losses
+    later = np.diff(losses[2::2])
+    assert later[0] > 2 * later[-1]  # the second cycle is not the steady one
+    assert cycle.loss == pytest.approx(later[-1], abs=1e-3 * losses[2])
+
+
+def test_integers_of_numpy() -> None:
+    points = [(int(P), int(T)) for P, T in np.array([[73, 5], [7738, 8], [5, 3], [6000, -70]])]
+    curve = after([(np.int64(P), np.int64(T)) for P, T in points])  # type: ignore[misc]
+    assert shape(curve) == shape(after([(Fraction(P), Fraction(T)) for P, T in points]))
+    scene, path = shaded(), {"loads": [1.0], "forces": [0.1]}
+    counts = [cr.load_path(scene, **path, general_steps=n).displacements for n in (np.int32(4), 4)]
+    assert counts[0] == counts[1]
+
+
 @pytest.mark.parametrize("given", [{"load": 2.8}, {"approach": 1.25}, {"approach": 0.5}])
 def test_a_displacement_at_gross_sliding_or_just_below(given: dict[str, float]) -> None:
     """Order fails but for the last contact. The shear force is f P up to rounding."""

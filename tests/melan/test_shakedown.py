@@ -275,3 +275,31 @@ def test_one_asperity_slides_on_only_as_all_do(kind: Any) -> None:
     assert [found.factor, found.gross] == pytest.approx([5.0, 5.0])
     assert found.proved
     assert found.gap < 1e-10
+
+
+def test_an_asperity_that_opens_as_the_load_rises() -> None:
+    """The asperity amid three others touches at the mean load, and is open at the largest."""
+    turn = np.radians([90, 210, 330])
+    positions = [*np.column_stack((np.cos(turn), np.sin(turn))), (0.0, 0.0)]
+    asperities = cr.Asperities(
+        positions, [1.0, 1.0, 1.0, 0.01], heights=[0.0] * 3 + [-0.24150756515]
+    )
+    scene = cr.Scene(np.inf, asperities, cr.Material(1.0, 0.3), 0.5)
+    load, most = 4 * 0.8495**3, 4 * 0.8655**3
+    assert [cr.press(scene, load=P).status[3] for P in (load, most)] == ["contact", "open"]
+    forces, loads = [0.005 * load, -0.005 * load, 0.0], [0.0, 0.0, most - load]
+    found = cr.shakedown(scene, load=load, force_amplitudes=forces, load_amplitudes=loads)
+    assert (found.order, found.lower, found.upper) == ("fails", 0.0, np.inf)
+
+
+@pytest.mark.parametrize("kind", ["exact", "elastic", "vector"])
+def test_an_undecided_asperity_leaves_the_limit_open(kind: Any) -> None:
+    """It touches, by an indentation of 2e-34, and slides in every cycle."""
+    asperities = cr.Asperities(
+        [[0, 0], [2.0, 0.5], [-1.5, 1.0]], 1.0, heights=[0, -0.001, -0.02836162543917945]
+    )
+    material = cr.Material(1.0, 0.3)
+    scene = cr.Scene(2.1243957803714115e17, asperities, material, 0.5, geometry="summit")
+    assert cr.press(scene, load=0.0129).status[2] == "undecided"
+    found = cr.shakedown(scene, load=0.0129, force_amplitudes=swung(kind, 6e-4), kind=kind)
+    assert found.lower == 0.0
