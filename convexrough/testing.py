@@ -113,7 +113,7 @@ def assert_agree(
 
     Two results contradict each other if proved statuses differ, or if values differ by more than
     the sum of their error bounds (`compare.contradictions`). Raises AssertionError if the check
-    fails, and InputError if two contacts have different prescribed quantities.
+    fails, and InputError if two contacts are of different problems.
 
     >>> other = cr.press(scene, approach=5e-5, solver="conic")
     >>> cr.testing.assert_agree(contact, other, within=1e-9)
@@ -126,6 +126,13 @@ def assert_agree(
         expected = f"as many asperities as in the first, {len(one.loads)}"
         raise InputError("second", found=len(other.loads), expected=expected)
     if isinstance(first, Contact) and isinstance(second, Contact):
+        if scene is not None or approach is not None or load is not None:
+            expected = "none for two contacts, which contain their problems"
+            raise InputError("scene, approach, load", found="a value", expected=expected)
+        for name in ("contact_points", "offsets", "relative_radii"):
+            if not np.array_equal(*(getattr(each.scene, name) for each in (first, second))):
+                expected = "a contact of the same asperities and the same sphere as the first"
+                raise InputError("second", found=f"other {name} of the scene", expected=expected)
         wanted, given = (
             f"approach {each.approach!r}" if (P := each.prescribed_load) is None else f"load {P!r}"
             for each in (first, second)

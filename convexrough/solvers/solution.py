@@ -59,7 +59,8 @@ class Solution(Record):
             raise SolverError("loads with masked entries, expected real numbers")
         loads = np.asarray(loads)
         if loads.shape != (len(problem),):
-            raise SolverError(f"loads of shape {loads.shape}, expected ({len(problem)},)")
+            expected = f"({len(problem)},): one for each asperity that could touch"
+            raise SolverError(f"loads of shape {loads.shape}, expected {expected}")
         if loads.dtype.kind not in "iuf":
             raise SolverError(f"loads of type {loads.dtype}, expected real numbers")
         known = np.isfinite(loads).all()

@@ -92,7 +92,8 @@ def read_arrays(path: Path, known: Sequence[str]) -> tuple[Columns, list[tuple[s
     wanted = [name for name in columns if name.lower() in known] or list(columns)
     lengths = {len(columns[name]) for name in wanted}
     if len(lengths) > 1:
-        raise ValueError(f"arrays of lengths {sorted(lengths)}")
+        found = ", ".join(f"{len(columns[name])} numbers in {name}" for name in wanted)
+        raise FileError(f"{path}: found {found}, expected as many in each")
     kept = {name: values for name, values in columns.items() if len(values) in lengths}
     said = list[tuple[str, str]]()
     for name, value in named.items() if len(named) > 1 else ():
@@ -161,6 +162,8 @@ def _matlab(path: Path) -> dict[str, Any]:
         found = loadmat(str(path), appendmat=False, simplify_cells=True)
     named = {name: each for name, each in found.items() if not name.startswith("__")}
     only = next(iter(named.values()), None)
+    if isinstance(only, list) and only and all(isinstance(each, dict) for each in only):
+        only = {name: np.array([each[name] for each in only]) for name in only[0]}
     return only if len(named) == 1 and isinstance(only, dict) else named
 
 

@@ -297,7 +297,7 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "an index twice": (lambda case: {"index": [0, *range(COUNT - 1)], "load": case.loads}, "",
                        "column index: found 0 in row 2 and row 3"),
     "a matrix on its side": (lambda case: matrix(case.table()).T, "a.npy",
-                             "12 columns of 3: transposed?"),
+                             "12 columns and 3 rows: transposed?"),
     "a page of HTML": (lambda _: "<!DOCTYPE html>\n<html><body>404</body></html>\n", "",
                        "a page in HTML"),
     "an index from who knows where": (lambda _: {"index": [3, 4, 5], "load": [1, 2, 3]}, "",
