@@ -158,6 +158,8 @@ READ: dict[str, tuple[Any, ...]] = {
     "gzip of German": (lambda case: german(case.table()), "a.csv.gz"),
     "MATLAB's matrix": (lambda case: {"result": matrix(case.table())}, "a.mat"),
     "MATLAB's structure": (lambda case: {"result": case.table()}, "a.mat"),
+    "MATLAB's array of structures": (lambda case: {"result": np.rec.fromarrays(
+        [*case.table().values()], names=[*case.table()])}, "a.mat"),
     "MATLAB's row of loads": (lambda case: {"load": case.loads, "more": "a note"}, "a.mat"),
     "workbook with a title": (lambda case: [
         [["Run 7"], [], *cells(case.table("x\xa0[m] y\xa0[m] load\xa0[N]"))]], "a.xlsx"),
