@@ -227,3 +227,5 @@ def test_displacement_outside_is_boussinesqs_integral(distance: float) -> None:
 
     integral = 2 * dblquad(kernel, 0, np.pi / 2, 0, np.pi, epsabs=0, epsrel=1e-10)[0]
     assert hertz.surface_displacement(r, a, radius) == pytest.approx(integral, rel=1e-9)
+    rim = hertz.surface_displacement(a * np.array([1 - 1e-9, 1 + 1e-9]), a, radius)
+    assert rim[0] == pytest.approx(rim[1], rel=1e-8)  # inside it is the shape of the sphere
