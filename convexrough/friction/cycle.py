@@ -59,7 +59,7 @@ class Cycle(Table, Plottable):
     stick_radii      : [length] radius of the disc that always sticks
     slip_errors, stick_radius_errors : [length] proved bounds on the errors of these two
     level, force_level : [force] L* and f T*: from the second cycle on the memory curve
-        (docs/theory/paths.md) is the same at every moment up to the load L*
+        (docs/theory/paths.md) is the same at every moment up to the load L*; nan for general steps
     balance_defect   : relative difference between `loss` and the loss by (1) of
         docs/theory/losses.md, as a check of rounding; nan unless `one_loop`, or for general steps
     loss_normalised  : loss / W0, with W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H). P is the highest load,

@@ -195,6 +195,7 @@ def _cycle(contact: Contact, closed: Closed, spent: Ball, moved: Ball) -> Cycle:
         first, loss = each[0], each[-1] if closed.settled(each) else np.nan
         amplitude = float(np.ptp(general.states.displacements.value[-closed.once - 1 :])) / 2.0
     unknown = np.inf if order == "fails" else 0.0
+    unused = np.nan if closed.general is not None else 0.0
     unproved = 0.0 if order == "proved" else np.inf
     statuses = {
         "intermittent": lost,
@@ -214,8 +215,8 @@ def _cycle(contact: Contact, closed: Closed, spent: Ball, moved: Ball) -> Cycle:
         slip_errors=frozen(slip_errors + unknown),
         stick_radii=radii,
         stick_radius_errors=frozen(radius_errors + unknown),
-        level=float(stuck),
-        force_level=float(levels.coefficient.value) * float(stuck_height),
+        level=float(stuck) + unused,
+        force_level=float(levels.coefficient.value) * float(stuck_height) + unused,
         balance_defect=defect,
         loss_normalised=float(loss) / (reference.energy_scale if reference else np.nan),
         smooth_normalised=smooth,

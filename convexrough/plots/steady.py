@@ -43,8 +43,10 @@ def steady_figures(found: Cycle) -> Figures:
     layers = status_layers(found.status, found.contact.contact_radii)
     draw_map(chart, found.scene.contact_points, Scale(found.contact).length, layers)
     name_statuses(figure, found.status)
-    lost = style.quantity(found.loss, found.scene.units.work)
-    style.title(chart, f"each cycle after the first loses {lost}")
+    said = "the loss does not settle"
+    if not np.isnan(found.loss):
+        said = f"a steady cycle loses {style.quantity(found.loss, found.scene.units.work)}"
+    style.title(chart, said)
     return Figures({"steady": figure})
 
 
@@ -68,14 +70,14 @@ def draw_losses(axes: Axes, found: PhaseLosses) -> None:
     """Draw loss / factor^3 against phase; for small factors the lines coincide."""
     sizes = np.unique(found.factors)[-MOST_FACTORS:]
     cubes = np.abs(found.factors) ** 3
-    most = float((found.losses / cubes).max()) or 1.0
+    most = float(np.fmax.reduce(found.losses / cubes, initial=0.0)) or 1.0
     unit = style.measure(most, found.scene.units.work, "W_m")
     for size, shade, pattern in zip(sizes, style.shades_of(len(sizes)), PATTERNS, strict=False):
         those = np.flatnonzero(found.factors == size)
         those = those[np.argsort(found.phases[those])]
         turns = np.degrees(found.phases[those])
         rough, smooth = (unit.of(each / cubes)[those] for each in (found.losses, found.smooth))
-        axes.plot(turns, rough, color=shade, lw=1.5, ls=pattern, label=f"{size:g}")
+        axes.plot(turns, rough, ".", color=shade, lw=1.5, ls=pattern, label=f"{size:g}")
         axes.plot(turns, smooth, color=SMOOTH, lw=0.7, ls=pattern)
     axes.plot([], [], color=SMOOTH, lw=0.7, label="smooth sphere")
     style.legend(axes, "below", ncols=3, title="factor", title_fontsize=TICK)
@@ -109,11 +111,12 @@ def draw_closed(axes: Axes, found: Cycle) -> None:
     f = found.scene.friction or 1.0
     unit = label_plane(axes, float(found.loads.max()), found.scene.units.force)
     P, T = (np.append(each, each[0]) for each in (found.loads, found.forces / f))
-    level, height = found.level, found.force_level / f
-    _draw_cross(axes, unit, P.max(), level, height, color=FAINT, lw=0.9)
     axes.plot(unit.of(P), unit.of(T), color=ROUGH, lw=1.2)
-    axes.plot([unit.of(level)], [unit.of(height)], "o", ms=5, color=UNSURE)
-    style.title(axes, "dot: $(L^*, T^*)$; no change below $L^*$")
+    level, height = found.level, found.force_level / f
+    if not np.isnan(level):
+        _draw_cross(axes, unit, P.max(), level, height, color=FAINT, lw=0.9)
+        axes.plot([unit.of(level)], [unit.of(height)], "o", ms=5, color=UNSURE)
+        style.title(axes, "dot: $(L^*, T^*)$; no change below $L^*$")
 
 
 def label_plane(axes: Axes, most: float, force_unit: str = "") -> style.Measure:

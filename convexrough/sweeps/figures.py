@@ -84,13 +84,16 @@ def _draw_band(
     if max(map(len, known)) > 1:
         axes.fill_between(places, low, high, color=colour, alpha=0.16, lw=0)
         axes.fill_between(places, lower, upper, color=colour, alpha=0.30, lw=0)
+    line = "" if x.dtype.kind == "U" else line
     axes.plot(places, middle, color=colour, ls=line, marker=marker, ms=3, lw=1.2, label=name)
     there = [unsure[each].any() for each in groups]
-    axes.plot(places[there], middle[there], marker, ms=5, color=colour, mfc="white")
+    axes.plot(np.array(places)[there], middle[there], marker, ms=5, color=colour, mfc="white")
 
 
 def _grouped(x: Any) -> tuple[Any, list[Indices]]:
     """The values of x, and the rows of each value; for many values, the medians of x in bins."""
+    if x.dtype.kind == "U":  # names, in the order of the sweep
+        return (names := list(dict.fromkeys(x.tolist()))), [np.flatnonzero(x == it) for it in names]
     different, back = np.unique(x, return_inverse=True)
     if len(different) <= max(BINS, len(x) // 4):
         return different, [np.flatnonzero(back == i) for i in range(len(different))]
