@@ -195,7 +195,7 @@ def _cycle(contact: Contact, closed: Closed, spent: Ball, moved: Ball) -> Cycle:
         first, loss = each[0], each[-1] if closed.settled(each) else np.nan
         amplitude = float(np.ptp(general.states.displacements.value[-closed.once - 1 :])) / 2.0
     unknown = np.inf if order == "fails" else 0.0
-    unused = np.nan if closed.general is not None else 0.0
+    unused = 0.0 if general is None else np.nan
     unproved = 0.0 if order == "proved" else np.inf
     statuses = {
         "intermittent": lost,
