@@ -19,6 +19,7 @@ from convexrough.record import Record
 class Solution(Record):
     """A solution in scaled units: the approach, and the loads of all asperities that could touch.
 
+    approach : used by the solver only; results contain the approach that follows from the loads
     iterations : number of steps of the solver
     residual : residual of the contact law for `loads`, as in `NormalProblem.residual`; if `trial`
         is given, an upper bound on the residual of the loads in `trial`
