@@ -190,8 +190,7 @@ def _cycle(contact: Contact, closed: Closed, spent: Ball, moved: Ball) -> Cycle:
         if reference:
             smooth = float(mindlin.loss(float((max(heights) - min(heights)) / (2 * levels.load))))
     if (general := closed.general) is not None:
-        spent_by = np.append(0.0, general.losses[closed.once :: closed.once])  # the end of a cycle
-        each, defect = np.diff(spent_by), np.nan
+        each, defect = closed.losses_of(general), np.nan
         first, loss = each[0], each[-1] if closed.settled(each) else np.nan
         amplitude = float(np.ptp(general.states.displacements.value[-closed.once - 1 :])) / 2.0
     unknown = np.inf if order == "fails" else 0.0

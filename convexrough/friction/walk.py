@@ -156,9 +156,13 @@ class Closed(Walk):
         points, found = list(self.points[: self.once]), None
         for count in CYCLES:
             found = followed(self.levels, self.start, [*points * count, points[0]])
-            if self.settled(np.diff(found.losses[self.once :: self.once], prepend=0.0)):
+            if self.settled(self.losses_of(found)):
                 break
         return found
+
+    def losses_of(self, followed: SteppedPath) -> Array:
+        """The loss of each cycle of a path of several cycles."""
+        return np.diff(followed.losses[self.once :: self.once], prepend=0.0)
 
     def settled(self, losses: Array) -> bool:
         """True if the losses of the cycles 1, 2, ... no longer change."""
