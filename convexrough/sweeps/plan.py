@@ -205,7 +205,7 @@ def _planned(
         own = [name for name, stage in asked.stages.items() if name in used and stage.highest_load]
         own_loads = [it for it in own if not any(key.startswith(f"{it}.") for key in labels)]
     manifest = {
-        "schema": 2,
+        "schema": 3,
         "version": __version__,
         "sweep": inputs.hexdigest(),
         "scenes": source.count,

@@ -14,10 +14,11 @@ from typing import Any
 
 import psutil
 import pytest
-from sweep_files import same, swept, tables, toml
+from sweep_files import SMALL, same, swept, tables, toml
 
 import convexrough as cr
 from convexrough.progress import logged
+from convexrough.sweeps import plan
 from convexrough.sweeps.folder import open_folder
 
 CONTENTS = tables(sweep={"seeds": 16, "measure": ["load"]})
@@ -178,3 +179,23 @@ def test_a_full_disk(file: Path, whole: cr.SweepTable) -> None:
     assert rows(file) == SCENES // PARTS
     assert not list((file / "a-sweep/parts").glob(".*"))
     assert same(resumed(file), whole)
+
+
+def test_rows_of_another_sweep_are_not_mixed_in(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neither by a sweep that still runs when another replaces it, nor by files that it left."""
+    monkeypatch.setattr(plan, "LEAST_BATCHES", 4)
+    mine, out = swept(SMALL), tmp_path / "a"
+
+    def replace(record: logging.LogRecord) -> None:
+        if record.getMessage().startswith("10 of 20 scenes"):
+            shutil.copytree(out / "parts", tmp_path / "left")
+            swept(SMALL, out=out, overwrite=True)
+
+    with logged(replace), pytest.raises(cr.FileError, match="a: holds another sweep, 16 scenes"):
+        swept(tables(sweep={"seeds": 5}), out=out)
+    assert same(cr.open_sweep(out), mine)
+    shutil.copytree(tmp_path / "left", out / "parts", dirs_exist_ok=True)
+    assert same(cr.open_sweep(out), mine)
+    assert same(swept(SMALL, out=out, resume=True), mine)

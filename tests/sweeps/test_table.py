@@ -243,6 +243,12 @@ def test_a_part_of_a_sweep(whole: cr.SweepTable, tmp_path: Path) -> None:
     assert same(table, whole)
     second = swept(SMALL, part=(2, 3))
     assert numbers(second, "scene") == [list(range(5, 10))]
+    other = tables(sweep={"seeds": 5})
+    for contents, full in ((SMALL, [True] * 3), (other, [False, False, True])):
+        for k in (1, 2, 3):  # a part replaces another sweep, but only its own share of the same
+            table = swept(contents, out=tmp_path / "a", part=(k, 3), overwrite=True)
+            assert table.complete == full[k - 1]
+    assert same(table, swept(other))
 
 
 def test_a_folder_of_another_sweep_is_refused(folder: Path) -> None:
