@@ -68,7 +68,11 @@ class Folder:
         pyarrow, parquet = arrow()
         whole = BytesIO()
         parquet.write_table(pyarrow.table(columns), whole, write_page_checksum=True)
-        write_text(self.file(int(columns["scene"][0])), whole.getvalue())
+        try:
+            write_text(self.file(int(columns["scene"][0])), whole.getvalue())
+        except FileError as error:
+            said = f"{error}; the finished parts are kept; {RESUME} computes the rest"
+            raise FileError(said) from error
 
     def read(self, part: range, names: Sequence[str] | None = None) -> Columns:
         """Some columns of a part, by default all. Raises FileError if the part is damaged."""

@@ -1,5 +1,6 @@
 """What is in the table of a sweep, and the forms in which it is had."""
 
+import json
 import logging
 import shutil
 from dataclasses import replace
@@ -313,10 +314,17 @@ def test_the_command(command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPat
     written = {path.name for path in (tmp_path / "b").iterdir()}
     assert {"quantiles.csv", "loss_0.37-over-normal.load.png"} <= written
     assert "not drawn" not in out
+    parts = sorted((tmp_path / "a-sweep/parts").iterdir())
+    parts[0].unlink()
+    parts[3].unlink()
     monkeypatch.setattr("convexrough.sweeps.report.MOST_FIGURES", 1)
     status, out, err = command("sweep", "--summary", "a-sweep", "--out", "c")
     assert len(list((tmp_path / "c").glob("*.png"))) == 1
     assert f"not drawn: {len(written) - 3} more figures; cr.open_sweep(DIR).plot(" in out
+    assert "\nincomplete: 2 of 16 scenes are missing\n" in out
+    assert err == "convexrough: warning: incomplete: 2 of 16 scenes are missing\n"
+    assert json.loads((tmp_path / "c/files.json").read_text())["rows"] == 14
+    assert cr.open_sweep("a-sweep").plot().get_title("left") == "2 scenes are missing"
 
 
 def test_onset_is_the_least_force_at_which_the_fraction_slides() -> None:
