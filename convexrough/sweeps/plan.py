@@ -27,8 +27,8 @@ from convexrough.tabular.units import UnitNames
 from convexrough.version import __version__
 
 #: A batch has at most MOST_SCENES scenes and about MOST_ASPERITIES asperities. There are about
-#: LEAST_BATCHES batches or more, if there are enough scenes. At most TRIED scenes are tried to find
-#: out which numbers can be measured.
+#: LEAST_BATCHES batches or more, if there are enough scenes. At most TRIED scenes, among
+#: them the first and the last, are tried to find out which numbers can be measured.
 MOST_SCENES, MOST_ASPERITIES, LEAST_BATCHES, TRIED = 1000, 100_000, 32, 5
 
 
@@ -177,21 +177,23 @@ def _stages(cycle: Sequence[float], shear: Sequence[float]) -> Stages:
 def _planned(
     source: Source, measures: Sequence[str], said: Mapping[str, Any], units: UnitNames, **given: Any
 ) -> Plan:
-    """The plan for the scenes of `source`. The first scene that succeeds shows which numbers exist.
+    """The plan for the scenes of `source`. The first scene that succeeds shows which numbers exist;
+    if some are missing, other scenes show more.
 
     said  : entries of the manifest that describe the origin of the sweep
     given : all input on which the measured numbers depend, except `measures` and the version
     """
-    ask = source.part(range(tried := min(source.count, TRIED))).opened()
+    tried = sorted({(source.count - 1) * k // (TRIED - 1) for k in range(TRIED)})
+    ask, rows = source.part(tried).opened(), dict[str, list[str]]()
     with blamed_on(said["source"], unless_known=True):
-        for number in range(tried):
+        for number in tried:
             try:
                 asked = ask(number)
                 contact = asked.press()
-                columns = chosen(contact, asked.stages, measures)
+                columns = chosen(contact, asked.stages, measures, rows)
                 break
             except FAILURES:
-                if number == tried - 1:
+                if number == tried[-1]:
                     raise
     few = -(-source.count // LEAST_BATCHES)
     contents = {"version": __version__, "measure": list(measures), **given}

@@ -170,6 +170,23 @@ def test_a_missing_number_is_nan() -> None:
         assert not said or table.quantiles([measure])["0.05"][0] == -np.inf
 
 
+def test_numbers_that_the_first_scene_lacks() -> None:
+    """A scene with more rows fails; numbers of no common scene are both found."""
+    phases = sweeping(measure=["phase_losses.loss"], over={"steady.phases": [[0.5], [0.0, 1.0]]})
+    status, message = numbers(swept(phases | {"steady": {"ellipse": ELLIPSE}}), "status", "message")
+    assert status == ["certified", "failed"]
+    assert message[1].startswith(
+        "steady.phase_losses.loss: found row 1, without a column, expected"
+    )
+    measure, draw = ["by.load", "by.approach"], {"friction.coefficient": {"uniform": [0.4, 0.5]}}
+    held = sweeping(measure=measure, over=HELD, seeds=6, draw=draw)
+    table = swept(held | {"gradient": {"of": "loss", "fraction": 0.5}})
+    assert np.isnan(numbers(table, *measure)).tolist() == [
+        [False] * 6 + [True] * 6,
+        [True] * 6 + [False] * 6,
+    ]
+
+
 def test_a_figure_says_what_a_band_pools() -> None:
     over = {"sphere.radius": [0.9, 1.0], "normal.load": [1e-7, 2e-7, 3e-7]}
     table = swept(sweeping(over=over | {"friction.coefficient": [0.4, 0.5]}))
