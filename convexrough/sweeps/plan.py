@@ -106,14 +106,24 @@ def _of_values(grid: Grid, tables: Mapping[str, Any]) -> tuple[Study | None, lis
     """The checked tables of the first scene (None if wrong), and all mistakes in swept values."""
     first, seed = grid.point(0)
     study, mistakes = validate(with_values(tables, first, seed))
-    for where, lists in (("together", grid.together), ("over", grid.over)):
-        for key, values in lists.items():
-            named, here = "[{}] {}:".format(*key.split(".", 1)), f"[sweep] {where}.{key}[0]: "
-            mistakes = [here + each if each.startswith(named) else each for each in mistakes]
-            for i, value in enumerate(values[1:] if study else (), 1):
-                _, wrong = validate(with_values(tables, {**first, key: value}, seed))
-                mistakes += [f"[sweep] {where}.{key}[{i}]: {mistake}" for mistake in wrong]
+    axes = [("together", grid.together), *(("over", {key: it}) for key, it in grid.over.items())]
+    for where, lists in axes:
+        keys = [*lists]
+        mistakes = [_placed(each, where, keys, 0) for each in mistakes]
+        for i, row in enumerate([*zip(*lists.values(), strict=True)][1:] if study else (), 1):
+            values = {**first, **dict(zip(keys, row, strict=True))}
+            _, wrong = validate(with_values(tables, values, seed))
+            mistakes += [_placed(each, where, keys, i) for each in wrong]
     return study, grid.blame(mistakes, seed)
+
+
+def _placed(mistake: str, where: str, keys: Sequence[str], i: int) -> str:
+    """The mistake with its place in [sweep]: the i-th value of the key that it names, or of all;
+    for i = 0 only if it names a key."""
+    names = {key: "[{}] {}".format(*key.split(".", 1)) for key in keys}
+    own = [key for key, it in names.items() if mistake.startswith((f"{it}:", f"{it}[", f"{it}."))]
+    places = ", ".join(f"{where}.{key}[{i}]" for key in own or (keys if i else ()))
+    return f"[sweep] {places}: {mistake}" if places else mistake
 
 
 def plan_of_scenes(

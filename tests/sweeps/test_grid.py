@@ -1,6 +1,7 @@
 """Which scenes a sweep has, in which order, and what a file may say of them."""
 
 import itertools
+import math
 from pathlib import Path
 from typing import Any
 
@@ -84,6 +85,21 @@ def test_a_table_with_its_own_loads_is_named() -> None:
         sweep = {"measure": ["path.loss"], "over": {swept: [1.0, 2.0]}}
         plan = plan_of({**tables(path=path), "sweep": sweep}, Path("sweep.toml"))
         assert plan.manifest["own_loads"] == own
+
+
+def test_values_of_together_are_checked_together() -> None:
+    """Also where each of them is wrong beside the others of the first scene."""
+
+    def paths(last: list[float]) -> dict[str, Any]:
+        both = {"path.loads": [[3e-7], [3e-7] * 3], "path.forces": [[0.0], last]}
+        found = sweeping(together=both, measure=["path.loss"])
+        return found | {"path": {"loads": [1e-7], "forces": [0.0]}}
+
+    assert plan_of(paths([0.0] * 3)).source.count == 2
+    places = "[sweep] together.path.loads[1], together.path.forces[1]"
+    assert f"{places}: [path] loads, forces: found 3 and 2 values" in mistakes(paths([0.0] * 2))
+    places = "sweep.toml: [sweep] together.path.forces[1]"
+    assert mistakes(paths([math.nan])).startswith(f"{places}: [path] forces[0]: found nan")
 
 
 ROUGH = {**SMALL["asperities"], "height_std": 1e-7}  # seeds are those of the sweep
