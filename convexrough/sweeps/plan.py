@@ -27,8 +27,8 @@ from convexrough.tabular.units import UnitNames
 from convexrough.version import __version__
 
 #: A batch has at most MOST_SCENES scenes and about MOST_ASPERITIES asperities. There are about
-#: LEAST_BATCHES batches or more, if there are enough scenes. At most TRIED scenes, among
-#: them the first and the last, are tried to find out which numbers can be measured.
+#: LEAST_BATCHES batches or more, if there are enough scenes. At most TRIED scenes, the
+#: first and the last among them, are tried until each number to be measured is found.
 MOST_SCENES, MOST_ASPERITIES, LEAST_BATCHES, TRIED = 1000, 100_000, 32, 5
 
 
@@ -108,18 +108,17 @@ def _of_values(grid: Grid, tables: Mapping[str, Any]) -> tuple[Study | None, lis
     study, mistakes = validate(with_values(tables, first, seed))
     axes = [("together", grid.together), *(("over", {key: it}) for key, it in grid.over.items())]
     for where, lists in axes:
-        keys = [*lists]
-        mistakes = [_placed(each, where, keys, 0) for each in mistakes]
+        mistakes = [_placed(each, where, lists, 0) for each in mistakes]
         for i, row in enumerate([*zip(*lists.values(), strict=True)][1:] if study else (), 1):
-            values = {**first, **dict(zip(keys, row, strict=True))}
+            values = {**first, **dict(zip(lists, row, strict=True))}
             _, wrong = validate(with_values(tables, values, seed))
-            mistakes += [_placed(each, where, keys, i) for each in wrong]
+            mistakes += [_placed(each, where, lists, i) for each in wrong]
     return study, grid.blame(mistakes, seed)
 
 
-def _placed(mistake: str, where: str, keys: Sequence[str], i: int) -> str:
-    """The mistake with its place in [sweep]: the i-th value of the key that it names, or of all;
-    for i = 0 only if it names a key."""
+def _placed(mistake: str, where: str, keys: Iterable[str], i: int) -> str:
+    """The mistake with its place in [sweep]: the i-th value of the key that it names, or of all
+    keys; for i = 0, unchanged if it names none."""
     names = {key: "[{}] {}".format(*key.split(".", 1)) for key in keys}
     own = [key for key, it in names.items() if mistake.startswith((f"{it}:", f"{it}[", f"{it}."))]
     places = ", ".join(f"{where}.{key}[{i}]" for key in own or (keys if i else ()))
@@ -187,8 +186,7 @@ def _stages(cycle: Sequence[float], shear: Sequence[float]) -> Stages:
 def _planned(
     source: Source, measures: Sequence[str], said: Mapping[str, Any], units: UnitNames, **given: Any
 ) -> Plan:
-    """The plan for the scenes of `source`. The first scene that succeeds shows which numbers exist;
-    if some are missing, other scenes show more.
+    """The plan for the scenes of `source`. Scenes that are tried show which numbers exist.
 
     said  : entries of the manifest that describe the origin of the sweep
     given : all input on which the measured numbers depend, except `measures` and the version

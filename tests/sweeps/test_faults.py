@@ -183,9 +183,7 @@ def test_a_full_disk(file: Path, whole: cr.SweepTable) -> None:
     assert same(resumed(file), whole)
 
 
-def test_rows_of_another_sweep_are_not_mixed_in(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_rows_of_another_sweep_are_not_mixed_in(tmp_path: Path, monkeypatch: Any) -> None:
     """Neither by a sweep that still runs when another replaces it, nor by files that it left."""
     monkeypatch.setattr(plan, "LEAST_BATCHES", 4)
     mine, out = swept(SMALL), tmp_path / "a"
@@ -201,3 +199,4 @@ def test_rows_of_another_sweep_are_not_mixed_in(
     shutil.copytree(tmp_path / "left", out / "parts", dirs_exist_ok=True)
     assert same(cr.open_sweep(out), mine)
     assert same(swept(SMALL, out=out, resume=True), mine)
+    assert len([*(out / "parts").iterdir()]) == 4
