@@ -149,10 +149,12 @@ def _say_summary(folder: Path, output: common.Output) -> int:
         found = table.quantiles(at=report.AT)
     lines = [*report.describe(said), "", *report.describe_quantiles(found)]
     if output.out is not None:
-        with common.progress("writing results"), output.folder(output.out) as new:
+        counts = {name: said["sweep"][name] for name in ("scenes", "rows")}
+        with common.progress("writing results"), output.folder(output.out, **counts) as new:
             left_out = report.write_summary(new, table, found)
         lines += [*common.written(new), *left_out]
-    output.say({**said, "quantiles": rows_of(found)}, lines, report.cautions(table))
+    warnings = [*report.incomplete(said), *report.cautions(table)]
+    output.say({**said, "quantiles": rows_of(found)}, lines, warnings)
     return _status(said)
 
 

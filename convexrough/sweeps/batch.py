@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import scipy
 
-from convexrough.errors import SceneFileError
+from convexrough.errors import InputError, SceneFileError
 from convexrough.run.asperity_file import read_summits
 from convexrough.run.scene_file import Task, regular, tasks_of
 from convexrough.run.stage import Columns as Columns
@@ -55,7 +55,7 @@ class Tables:
         seeds = [known if seed is None else seed for _, seed in points]
         return found | {"seed": np.array(seeds, dtype=np.int64)}
 
-    def part(self, numbers: range) -> Tables:
+    def part(self, numbers: Sequence[int]) -> Tables:
         """A source that has these scenes at least, for a worker."""
         return self
 
@@ -97,7 +97,7 @@ class Tasks:
             "seed": np.full(len(numbers), NO_SEED, dtype=np.int64),
         }
 
-    def part(self, numbers: range) -> Tasks:
+    def part(self, numbers: Sequence[int]) -> Tasks:
         return Tasks({number: self.tasks[number] for number in numbers}, self.control)
 
     def opened(self) -> Callable[[int], Task]:
@@ -149,9 +149,16 @@ def compute(batch: Batch) -> tuple[Columns, Mapping[str, str]]:
     failed scene contains the message of its error.
     """
     wanted = {column.stage for column in batch.columns}
+    rows = {(column.number, column.row) for column in batch.columns}
+    names = {name for name, _ in rows}
 
     def alone(asked: Task) -> Measured:
-        return measured(asked.press(), asked.stages, wanted)
+        found = measured(asked.press(), asked.stages, wanted)
+        for name, row in found.numbers:
+            if name in names and (name, row) not in rows:
+                expected = "the rows of the first scene: put the longest lists first in [sweep]"
+                raise InputError(name, found=f"row {row}, without a column", expected=expected)
+        return found
 
     with one_thread():
         ask = batch.source.opened()

@@ -1,13 +1,15 @@
 """The folder of a sweep: a manifest and parts.
 
 The manifest describes the sweep. A part is a Parquet file of consecutive rows, written once and
-named by its first scene. All parts except the last have the same number of rows, which the manifest
-states. A complete part is never changed; a damaged one is removed and computed again. Another sweep
-replaces the manifest and all parts together.
+named by its first scene and a hash of its sweep, so that parts of another sweep are never read.
+All parts except the last have the same number of rows, which the manifest states. A complete part
+is never changed; a damaged one is removed and computed again. Another sweep replaces the manifest
+and removes all parts; the earlier sweep, if it still runs, then stops.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -40,22 +42,37 @@ class Folder:
     path: Path
     manifest: Mapping[str, Any]
 
+    @property
+    def ending(self) -> str:
+        """The end of the names of parts: a hash of the sweep and of the versions of packages."""
+        said = json.dumps([self.manifest["sweep"], self.manifest["versions"]], sort_keys=True)
+        return f"-{hashlib.sha256(said.encode()).hexdigest()[:12]}.parquet"
+
     def parts(self) -> list[range]:
         """The range of scenes of each part in the folder, in order; other files are ignored."""
         with file_errors(self.path / PARTS, "be read"):
-            names = [each.stem for each in (self.path / PARTS).glob("*.parquet")]
+            files = (self.path / PARTS).glob(f"*{self.ending}")
+            names = [each.name.removesuffix(self.ending) for each in files]
         firsts = sorted(int(name) for name in names if name.isdecimal())
         return [part_from(self.manifest, first) for first in firsts]
 
     def file(self, first: int) -> Path:
-        return self.path / PARTS / f"{first:012d}.parquet"
+        return self.path / PARTS / f"{first:012d}{self.ending}"
 
     def write(self, columns: Columns) -> None:
-        """Write the columns of a part. An interruption leaves no incomplete part."""
+        """Write the columns of a part. An interruption leaves no incomplete part.
+
+        Raises FileError if it cannot be written, or if another sweep replaced this one meanwhile.
+        """
+        folder_of(self.path, self.manifest)
         pyarrow, parquet = arrow()
         whole = BytesIO()
         parquet.write_table(pyarrow.table(columns), whole, write_page_checksum=True)
-        write_text(self.file(int(columns["scene"][0])), whole.getvalue())
+        try:
+            write_text(self.file(int(columns["scene"][0])), whole.getvalue())
+        except FileError as error:
+            said = f"{error}; the finished parts are kept; {RESUME} computes the rest"
+            raise FileError(said) from error
 
     def read(self, part: range, names: Sequence[str] | None = None) -> Columns:
         """Some columns of a part, by default all. Raises FileError if the part is damaged."""
@@ -117,7 +134,7 @@ def open_folder(path: Path) -> Folder:
             if not (path / MANIFEST).exists():
                 raise FileError(f"{path}: not a sweep: there is no {MANIFEST}")
             manifest = json.loads((path / MANIFEST).read_text(encoding="utf-8"))
-        if not isinstance(manifest, dict) or manifest.get("schema") != 2:
+        if not isinstance(manifest, dict) or manifest.get("schema") != 3:
             raise ValueError("not a sweep of this version")
     except ValueError as error:
         raise FileError(f"{path / MANIFEST}: cannot be read: {error}") from error
@@ -127,7 +144,7 @@ def open_folder(path: Path) -> Folder:
 def make_folder(path: Path, manifest: Mapping[str, Any], *, overwrite: bool = False) -> Folder:
     """The folder of a sweep, created if it does not exist.
 
-    overwrite : remove an earlier sweep, and files of `sweep --summary`; other files stay
+    overwrite : replace another sweep, and remove files of `sweep --summary`; other files stay
 
     Raises FileError if the folder cannot be written, or contains files but no manifest, or another
     sweep, or one begun with other versions of packages; ExtraError if pyarrow is not installed.
@@ -135,11 +152,9 @@ def make_folder(path: Path, manifest: Mapping[str, Any], *, overwrite: bool = Fa
     arrow()
     with file_errors(path, "hold results"):
         if overwrite and (path / MANIFEST).exists():
-            earlier = open_folder(path)
+            open_folder(path)  # raises FileError if it is not a sweep
             refuse_others(path, "sweep")
             remove_earlier(path)  # of `sweep --summary`
-            for part in earlier.parts():
-                earlier.file(part.start).unlink(missing_ok=True)
             write_text(path / MANIFEST, to_json(manifest) + "\n")
         if not (path / MANIFEST).exists():
             path.mkdir(parents=True, exist_ok=True)
@@ -158,6 +173,16 @@ def make_folder(path: Path, manifest: Mapping[str, Any], *, overwrite: bool = Fa
                     )
                 (path / PARTS).mkdir(exist_ok=True)
                 write_text(path / MANIFEST, to_json(manifest) + "\n")
+        folder = folder_of(path, manifest)
+        for file in (path / PARTS).glob(f"{'[0-9]' * 12}-{'[0-9a-f]' * 12}.parquet"):
+            if not file.name.endswith(folder.ending):  # of another sweep
+                file.unlink(missing_ok=True)
+    return folder
+
+
+def folder_of(path: Path, manifest: Mapping[str, Any]) -> Folder:
+    """The folder of this sweep. Raises FileError if it holds another sweep, or one begun with
+    other versions of packages."""
     folder = open_folder(path)
     there = folder.manifest
     if there["sweep"] != manifest["sweep"]:

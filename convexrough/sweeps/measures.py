@@ -107,12 +107,15 @@ def row_label(ends: Sequence[float]) -> str:
     return "_".join(f"{float(it)!r}" for it in (*(it for it in first if it != -last), last))
 
 
-def chosen(contact: Contact, stages: Stages, measures: Sequence[str]) -> tuple[Column, ...]:
+def chosen(
+    contact: Contact, stages: Stages, measures: Sequence[str], rows: dict[str, list[str]]
+) -> tuple[Column, ...]:
     """The columns for each name in `measures`. A name stands for the first number that has it.
 
     Stages are computed until all names are found. Raises InputError for a name of no number.
+
+    rows : the rows of each number of other scenes; those of this scene are added
     """
-    rows: dict[str, list[str]] = {}
 
     def number(name: str) -> str:
         return next((each for each in rows if f".{each}".endswith(f".{name}")), "")
@@ -121,7 +124,8 @@ def chosen(contact: Contact, stages: Stages, measures: Sequence[str]) -> tuple[C
         if not all(map(number, measures)):
             only = {stage: stages[stage]} if stage in stages else {}
             for each, row in measured(contact, only, {stage}).numbers:
-                rows.setdefault(each, []).append(row)
+                if row not in rows.setdefault(each, []):
+                    rows[each].append(row)
     columns = []
     for name in measures:
         if not number(name):

@@ -27,8 +27,8 @@ from convexrough.tabular.units import UnitNames
 from convexrough.version import __version__
 
 #: A batch has at most MOST_SCENES scenes and about MOST_ASPERITIES asperities. There are about
-#: LEAST_BATCHES batches or more, if there are enough scenes. At most TRIED scenes are tried to find
-#: out which numbers can be measured.
+#: LEAST_BATCHES batches or more, if there are enough scenes. At most TRIED scenes, the
+#: first and the last among them, are tried until each number to be measured is found.
 MOST_SCENES, MOST_ASPERITIES, LEAST_BATCHES, TRIED = 1000, 100_000, 32, 5
 
 
@@ -106,14 +106,23 @@ def _of_values(grid: Grid, tables: Mapping[str, Any]) -> tuple[Study | None, lis
     """The checked tables of the first scene (None if wrong), and all mistakes in swept values."""
     first, seed = grid.point(0)
     study, mistakes = validate(with_values(tables, first, seed))
-    for where, lists in (("together", grid.together), ("over", grid.over)):
-        for key, values in lists.items():
-            named, here = "[{}] {}:".format(*key.split(".", 1)), f"[sweep] {where}.{key}[0]: "
-            mistakes = [here + each if each.startswith(named) else each for each in mistakes]
-            for i, value in enumerate(values[1:] if study else (), 1):
-                _, wrong = validate(with_values(tables, {**first, key: value}, seed))
-                mistakes += [f"[sweep] {where}.{key}[{i}]: {mistake}" for mistake in wrong]
+    axes = [("together", grid.together), *(("over", {key: it}) for key, it in grid.over.items())]
+    for where, lists in axes:
+        mistakes = [_placed(each, where, lists, 0) for each in mistakes]
+        for i, row in enumerate([*zip(*lists.values(), strict=True)][1:] if study else (), 1):
+            values = {**first, **dict(zip(lists, row, strict=True))}
+            _, wrong = validate(with_values(tables, values, seed))
+            mistakes += [_placed(each, where, lists, i) for each in wrong]
     return study, grid.blame(mistakes, seed)
+
+
+def _placed(mistake: str, where: str, keys: Iterable[str], i: int) -> str:
+    """The mistake with its place in [sweep]: the i-th value of the key that it names, or of all
+    keys; for i = 0, unchanged if it names none."""
+    names = {key: "[{}] {}".format(*key.split(".", 1)) for key in keys}
+    own = [key for key, it in names.items() if mistake.startswith((f"{it}:", f"{it}[", f"{it}."))]
+    places = ", ".join(f"{where}.{key}[{i}]" for key in own or (keys if i else ()))
+    return f"[sweep] {places}: {mistake}" if places else mistake
 
 
 def plan_of_scenes(
@@ -177,21 +186,22 @@ def _stages(cycle: Sequence[float], shear: Sequence[float]) -> Stages:
 def _planned(
     source: Source, measures: Sequence[str], said: Mapping[str, Any], units: UnitNames, **given: Any
 ) -> Plan:
-    """The plan for the scenes of `source`. The first scene that succeeds shows which numbers exist.
+    """The plan for the scenes of `source`. Scenes that are tried show which numbers exist.
 
     said  : entries of the manifest that describe the origin of the sweep
     given : all input on which the measured numbers depend, except `measures` and the version
     """
-    ask = source.part(range(tried := min(source.count, TRIED))).opened()
+    tried = sorted({(source.count - 1) * k // (TRIED - 1) for k in range(TRIED)})
+    ask, rows = source.part(tried).opened(), dict[str, list[str]]()
     with blamed_on(said["source"], unless_known=True):
-        for number in range(tried):
+        for number in tried:
             try:
                 asked = ask(number)
                 contact = asked.press()
-                columns = chosen(contact, asked.stages, measures)
+                columns = chosen(contact, asked.stages, measures, rows)
                 break
             except FAILURES:
-                if number == tried - 1:
+                if number == tried[-1]:
                     raise
     few = -(-source.count // LEAST_BATCHES)
     contents = {"version": __version__, "measure": list(measures), **given}
@@ -205,7 +215,7 @@ def _planned(
         own = [name for name, stage in asked.stages.items() if name in used and stage.highest_load]
         own_loads = [it for it in own if not any(key.startswith(f"{it}.") for key in labels)]
     manifest = {
-        "schema": 2,
+        "schema": 3,
         "version": __version__,
         "sweep": inputs.hexdigest(),
         "scenes": source.count,

@@ -42,7 +42,14 @@ def describe(summary: Summary) -> list[str]:
     if left_out := it["not_measured"]:
         lines.append(("left out", f"{', '.join(map('[{}]'.format, left_out))}: nothing measured"))
     lines.append(("folder", it["folder"]))
-    return labelled(lines, 12)
+    return [*labelled(lines, 12), *incomplete(summary)]
+
+
+def incomplete(summary: Summary) -> list[str]:
+    """A line that tells how many scenes have no row yet; none if the sweep is complete."""
+    scenes = summary["sweep"]["scenes"]
+    missing = scenes - summary["sweep"]["rows"]
+    return [f"incomplete: {missing:,} of {scenes:,} scenes are missing"] if missing else []
 
 
 def describe_quantiles(found: Columns) -> list[str]:

@@ -72,7 +72,7 @@ def sweep(
     executor : any executor of `concurrent.futures`; default: processes
     workers  : number of processes; default: the number of cores that this process may use
     resume   : continue an interrupted sweep in the folder
-    overwrite : first remove the results of an earlier sweep in the folder
+    overwrite : first remove another sweep from the folder, or earlier rows of these scenes
     part     : (k, n): compute only the k-th of n shares of the scenes, with k from 1 to n
 
     The table is the same, bit for bit, for any executor, any order of computation and any number of
@@ -126,6 +126,8 @@ def run(
     todo = _share(plan, part)
     if out is not None:
         folder = make_folder(Path(out), plan.manifest, overwrite=overwrite)
+        for each in todo if overwrite else ():
+            folder.file(each.start).unlink(missing_ok=True)
         todo, found = folder.missing(todo, resume)
         LOGGER.info(found)
     count = sum(map(len, todo))

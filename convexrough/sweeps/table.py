@@ -181,7 +181,7 @@ class SweepTable(Record):
 
         Raises InputError if nothing is swept, if there are no rows, and for unknown names.
         """
-        from convexrough.plots.style import label, literal  # only when it draws: loads matplotlib
+        from convexrough.plots.style import TICK, label, literal  # only here: loads matplotlib
         from convexrough.sweeps.figures import draw_quantiles
 
         if not self.swept or not len(self):
@@ -193,6 +193,9 @@ class SweepTable(Record):
         others = [key for key in self.points if key != over]
         columns = self.read([over, *others, "status", measured])
         axes = draw_quantiles(columns, measured, over, others, axes)
+        if missing := self.scenes - len(self):
+            said = (axes.get_title("left"), f"{missing:,} scenes are missing")
+            axes.set_title(", ".join(filter(None, said)), fontsize=TICK, loc="left")
         label(axes, literal(self._said(over)), literal(self._said(measured)))
         return axes
 

@@ -1,7 +1,9 @@
 """Which scenes a sweep has, what a file may say of them, what is in its table, and its forms."""
 
 import itertools
+import json
 import logging
+import math
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -171,6 +173,21 @@ def test_a_missing_number_is_nan() -> None:
         assert not said or table.quantiles([measure])["0.05"][0] == -np.inf
 
 
+def test_numbers_that_the_first_scene_lacks() -> None:
+    """A scene with more rows fails; numbers of no common scene are both found."""
+    phases = sweeping(measure=["phase_losses.loss"], over={"steady.phases": [[0.5], [0.0, 1.0]]})
+    status, message = numbers(swept(phases | {"steady": {"ellipse": ELLIPSE}}), "status", "message")
+    assert status == ["certified", "failed"]
+    assert message[1].startswith(
+        "steady.phase_losses.loss: found row 1, without a column, expected"
+    )
+    measure, draw = ["by.load", "by.approach"], {"friction.coefficient": {"uniform": [0.4, 0.5]}}
+    held = sweeping(measure=measure, over=HELD, seeds=6, draw=draw)
+    table = swept(held | {"gradient": {"of": "loss", "fraction": 0.5}})
+    known = [[True] * 6 + [False] * 6, [False] * 6 + [True] * 6]
+    assert np.isfinite(numbers(table, *measure)).tolist() == known
+
+
 def test_a_figure_says_what_a_band_pools() -> None:
     over = {"sphere.radius": [0.9, 1.0], "normal.load": [1e-7, 2e-7, 3e-7]}
     table = swept(sweeping(over=over | {"friction.coefficient": [0.4, 0.5]}))
@@ -245,6 +262,12 @@ def test_a_part_of_a_sweep(whole: cr.SweepTable, tmp_path: Path) -> None:
     assert same(table, whole)
     second = swept(SMALL, part=(2, 3))
     assert numbers(second, "scene") == [list(range(5, 10))]
+    other = tables(sweep={"seeds": 5})
+    for contents, full in ((SMALL, [True] * 3), (other, [False, False, True])):
+        for k in (1, 2, 3):  # a part replaces another sweep, but only its own share of the same
+            table = swept(contents, out=tmp_path / "a", part=(k, 3), overwrite=True)
+            assert table.complete == full[k - 1]
+    assert same(table, swept(other))
 
 
 def test_a_folder_of_another_sweep_is_refused(folder: Path) -> None:
@@ -309,10 +332,17 @@ def test_the_command(command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPat
     written = {path.name for path in (tmp_path / "b").iterdir()}
     assert {"quantiles.csv", "loss_0.37-over-normal.load.png"} <= written
     assert "not drawn" not in out
+    parts = sorted((tmp_path / "a-sweep/parts").iterdir())
+    parts[0].unlink()
+    parts[3].unlink()
     monkeypatch.setattr("convexrough.sweeps.report.MOST_FIGURES", 1)
     status, out, err = command("sweep", "--summary", "a-sweep", "--out", "c")
     assert len(list((tmp_path / "c").glob("*.png"))) == 1
     assert f"not drawn: {len(written) - 3} more figures; cr.open_sweep(DIR).plot(" in out
+    assert "\nincomplete: 2 of 16 scenes are missing\n" in out
+    assert err == "convexrough: warning: incomplete: 2 of 16 scenes are missing\n"
+    assert json.loads((tmp_path / "c/files.json").read_text())["rows"] == 14
+    assert cr.open_sweep("a-sweep").plot().get_title("left") == "2 scenes are missing"
 
 
 def test_onset_is_the_least_force_at_which_the_fraction_slides() -> None:
@@ -398,6 +428,21 @@ def test_a_table_with_its_own_loads_is_named() -> None:
         sweep = {"measure": ["path.loss"], "over": {key: [1.0, 2.0]}}
         plan = plan_of({**tables(path=path), "sweep": sweep}, Path("sweep.toml"))
         assert plan.manifest["own_loads"] == own
+
+
+def test_values_of_together_are_checked_together() -> None:
+    """Also where each of them is wrong beside the others of the first scene."""
+
+    def paths(last: list[float]) -> dict[str, Any]:
+        both = {"path.loads": [[3e-7], [3e-7] * 3], "path.forces": [[0.0], last]}
+        found = sweeping(together=both, measure=["path.loss"])
+        return found | {"path": {"loads": [1e-7], "forces": [0.0]}}
+
+    assert plan_of(paths([0.0] * 3)).source.count == 2
+    places = "[sweep] together.path.loads[1], together.path.forces[1]"
+    assert f"{places}: [path] loads, forces: found 3 and 2 values" in mistakes(paths([0.0] * 2))
+    places = "sweep.toml: [sweep] together.path.forces[1]"
+    assert mistakes(paths([math.nan])).startswith(f"{places}: [path] forces[0]: found nan")
 
 
 ROUGH = {**SMALL["asperities"], "height_std": 1e-7}  # seeds are those of the sweep
