@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from itertools import cycle
 from typing import Any
 
@@ -49,7 +50,7 @@ def draw_quantiles(
     low, high = axes.dataLim.intervaly
     if 0 < 300 * low < high:
         axes.set_yscale("log")
-    axes.margins(x=0.02)
+    axes.margins(x=0.1 if x.dtype.kind == "U" else 0.02)
     legend(axes, "above", ncols=2)
     return axes
 
@@ -81,10 +82,12 @@ def _draw_band(
     known = [y[each][np.isfinite(y[each])] for each in groups]
     rows = [np.quantile(part, AT) if len(part) else np.full(len(AT), np.nan) for part in known]
     low, lower, middle, upper, high = np.array(rows).T
+    draw: Any = partial(axes.fill_between, color=colour, lw=0)
+    if x.dtype.kind == "U":  # nothing joins names
+        line, draw = "", partial(axes.vlines, color=colour, lw=8)
     if max(map(len, known)) > 1:
-        axes.fill_between(places, low, high, color=colour, alpha=0.16, lw=0)
-        axes.fill_between(places, lower, upper, color=colour, alpha=0.30, lw=0)
-    line = "" if x.dtype.kind == "U" else line
+        draw(places, low, high, alpha=0.16)
+        draw(places, lower, upper, alpha=0.30)
     axes.plot(places, middle, color=colour, ls=line, marker=marker, ms=3, lw=1.2, label=name)
     there = [unsure[each].any() for each in groups]
     axes.plot(np.array(places)[there], middle[there], marker, ms=5, color=colour, mfc="white")
