@@ -175,7 +175,7 @@ def shakedown(
         raise InputError("force_amplitudes", found=given, expected=expected)
     if kind != "exact" and np.any(p):
         expected = 'none, as the kind is not "exact": the normal load must be constant'
-        raise InputError("load_amplitudes", found=repr(load_amplitudes)[:60], expected=expected)
+        raise InputError("load_amplitudes", found=str([*map(float, p)])[:60], expected=expected)
     contact = press(scene, load=P0, influence=influence)
     if kind == "exact":
         limit = _exact(contact, t0, p, t)
