@@ -113,7 +113,7 @@ def assert_agree(
 
     Two results contradict each other if proved statuses differ, or if values differ by more than
     the sum of their error bounds (`compare.contradictions`). Raises AssertionError if the check
-    fails, and InputError if two contacts are of different problems.
+    fails, and InputError if a contact is of another problem than the rest.
 
     >>> other = cr.press(scene, approach=5e-5, solver="conic")
     >>> cr.testing.assert_agree(contact, other, within=1e-9)
@@ -125,21 +125,7 @@ def assert_agree(
     if len(one.loads) != len(other.loads):
         expected = f"as many asperities as in the first, {len(one.loads)}"
         raise InputError("second", found=len(other.loads), expected=expected)
-    if isinstance(first, Contact) and isinstance(second, Contact):
-        if scene is not None or approach is not None or load is not None:
-            expected = "none for two contacts, which contain their problems"
-            raise InputError("scene, approach, load", found="a value", expected=expected)
-        for name in ("contact_points", "offsets", "relative_radii"):
-            if not np.array_equal(*(getattr(each.scene, name) for each in (first, second))):
-                expected = "a contact of the same asperities and the same sphere as the first"
-                raise InputError("second", found=f"other {name} of the scene", expected=expected)
-        wanted, given = (
-            f"approach {each.approach!r}" if (P := each.prescribed_load) is None else f"load {P!r}"
-            for each in (first, second)
-        )
-        if given != wanted:
-            expected = f"{wanted}, as in the first"
-            raise InputError("second", found=f"prescribed {given}", expected=expected)
+    _asked(_one_problem, first, second, scene, approach, load)
     for answer in (one, other):
         _check_proof(answer.certificate, f" of {answer.name}")
     if found := contradictions(one, other):
@@ -181,6 +167,37 @@ def _answer(
         raise InputError("scene", found="none", expected=f"the scene of the loads `{name}`")
     certificate = certify(scene, given, approach=approach, load=load)
     return Answer(name, np.asarray(given, dtype=np.float64) * np.ones(len(scene)), certificate)
+
+
+def _one_problem(
+    first: Contact | ArrayLike,
+    second: Contact | ArrayLike,
+    scene: Scene | None,
+    approach: float | None,
+    load: float | None,
+) -> None:
+    """Raise InputError unless contacts, and the problem if it is given, are the same problem."""
+    known = list[tuple[str, Scene, str]]()
+    for name, each in (("first", first), ("second", second)):
+        if isinstance(each, Contact):
+            by_load = each.prescribed_load is not None
+            said = f"load {each.prescribed_load!r}" if by_load else f"approach {each.approach!r}"
+            known.append((name, each.scene, said))
+    if scene is not None or approach is not None or load is not None:
+        said = f"approach {approach!r}" if load is None else f"load {load!r}"
+        known.append(("scene, approach, load", scene or known[0][1], said))
+    (start, wanted, control), *others = known
+    for name, given, said in others:
+        for part in ("contact_points", "offsets", "relative_radii"):
+            if not np.array_equal(getattr(given, part), getattr(wanted, part)):
+                raise InputError(name, found=f"other {part}", expected=f"the scene of `{start}`")
+        if given.material.contact_modulus != wanted.material.contact_modulus:
+            found = f"the contact modulus {given.material.contact_modulus!r}"
+            expected = f"{wanted.material.contact_modulus!r}, as in `{start}`"
+            raise InputError(name, found=found, expected=expected)
+        if said != control:
+            expected = f"{control}, as in `{start}`"
+            raise InputError(name, found=f"prescribed {said}", expected=expected)
 
 
 def _check_proof(certificate: Certificate, whose: str = "") -> None:

@@ -117,7 +117,7 @@ def _swept(
     **options: Any,
 ) -> int:
     from convexrough.sweeps.plan import plan_of
-    from convexrough.sweeps.report import cautions, describe, progress_kept, summarise
+    from convexrough.sweeps.report import cautions, describe, incomplete, progress_kept, summarise
     from convexrough.sweeps.sweep import Processes, dask, run
 
     folder = output.out or Path(f"{sweep.stem}-sweep")
@@ -134,7 +134,7 @@ def _swept(
         common.say_aside("error", str(error), progress_kept(folder, plan))
         return common.SOLVER_FAILED
     said = summarise(table, **did)
-    output.say(said, describe(said), [*cautions(table)])
+    output.say(said, [*describe(said), *incomplete(said)], [*cautions(table)])
     return _status(said)
 
 

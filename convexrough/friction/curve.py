@@ -112,7 +112,7 @@ class MemoryCurve(Table, Plottable):
         """
         load, height = (
             Fraction(it if isinstance(it, int | Fraction) else checks.finite(name, it))
-            for name, it in (("load", load), ("height", height))
+            for name, it in (("P", load), ("T", height))
         )
         if abs(height) > load:
             expected = f"at most the load, {float(load)}, in size"

@@ -49,7 +49,8 @@ class Cycle(Table, Plottable):
 
     contact          : the contact, pressed with the highest load of the path
     loads, forces    : (m,) [force] load P and shear force Q at the points of the path
-    loss             : [force length] energy lost per cycle by both bodies, from the second cycle on
+    loss             : [force length] energy lost per cycle by both bodies, from the second cycle
+        on; for general steps, in the last of up to 12 cycles, or nan if it does not settle
     loss_first       : [force length] energy lost from the start without shear to the end of cycle 1
     loss_error, loss_first_error : proved bounds on the errors of the losses
     status           : "stuck" (no slip in the cycle), "partial" (a disc always sticks), "sliding"
@@ -218,7 +219,7 @@ class Cycle(Table, Plottable):
     def loop(self, points: int = 200, asperities: ArrayLike | None = None) -> Loop:
         """The loop of shear force against displacement, with points denser at its ends.
 
-        points     : approximate number of points; half of them on each branch
+        points     : approximate number of points of the outer loop; half of them on each branch
         asperities : indices of the asperities whose own loops are returned; default all
 
         Raises InputError if the load varies.
@@ -286,7 +287,8 @@ def loops(
     if any(np.ptp(each.loads) > 0 for each in cycles):
         raise InputError("cycles", found="a load that varies", expected="cycles at constant load")
     chosen = indices("asperities", asperities, len(contact.scene))
-    checks.fits_in_memory("points", points, 200 * len(contact.scene), noun="levels")
+    most = points // 2 * max(len(each.heights) for each in cycles)
+    checks.fits_in_memory("points", most, 200 * len(contact.scene), noun="levels")
     levels, f = contact.cached(FrictionLevels), Fraction(checks.friction(contact.scene.friction))
     loaded = levels.loads[chosen] > 0
     widest = max(each.force_amplitude for each in cycles)

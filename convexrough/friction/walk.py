@@ -28,8 +28,8 @@ from convexrough.friction.order import Order
 from convexrough.friction.state import States, losses, states_of, statuses_of
 
 #: Numbers of cycles that are followed by general steps until the loss of the last one changes by at
-#: most SETTLED of itself, or of a tenth of the first.
-CYCLES, SETTLED = (3, 6, 12), 1e-3
+#: most STEADY of itself, or of a tenth of the first.
+CYCLES, STEADY = (3, 6, 12), 1e-3
 
 #: Largest total number of vertices of the memory curves along a path. A vertex takes 300 bytes.
 MOST_VERTICES = 2 * 10**7
@@ -124,7 +124,9 @@ class Walk:
 
 
 class Closed(Walk):
-    """A closed path of m points, followed twice; the second cycle is the steady one."""
+    """A closed path of m points. The memory curve follows it twice; the second cycle is the steady
+    one. `general` repeats it until the loss settles.
+    """
 
     @classmethod
     def around(cls, levels: FrictionLevels, start: MemoryCurve, points: Sequence[Point]) -> Closed:
@@ -156,17 +158,18 @@ class Closed(Walk):
         points, found = list(self.points[: self.once]), None
         for count in CYCLES:
             found = followed(self.levels, self.start, [*points * count, points[0]])
-            if self.settled(self.losses_of(found)):
+            losses = self.losses_of(found)
+            if np.isnan(losses[-2:]).any() or self.settled(losses):
                 break
         return found
 
-    def losses_of(self, followed: SteppedPath) -> Array:
+    def losses_of(self, path: SteppedPath) -> Array:
         """The loss of each cycle of a path of several cycles."""
-        return np.diff(followed.losses[self.once :: self.once], prepend=0.0)
+        return np.diff(path.losses[self.once :: self.once], prepend=0.0)
 
     def settled(self, losses: Array) -> bool:
         """True if the losses of the cycles 1, 2, ... no longer change."""
-        change, limit = abs(losses[-1] - losses[-2]), SETTLED * max(losses[-1], 0.1 * losses[0])
+        change, limit = abs(losses[-1] - losses[-2]), STEADY * max(losses[-1], 0.1 * losses[0])
         return bool(change <= limit)
 
     @cached_property
@@ -180,7 +183,7 @@ class Closed(Walk):
         """True if, at constant load, the shear force rises and falls once in a cycle."""
         loads, heights = zip(*self.points[: self.once + 1], strict=True)
         rises = [b > a for a, b in pairwise(heights) if a != b]
-        return len({*loads}) == 1 and sum(a != b for a, b in pairwise([*rises, *rises[:1]])) <= 2
+        return len({*loads}) == 1 and sum(a != b for a, b in pairwise(rises)) <= 2
 
     @property
     def least(self) -> Fraction:

@@ -217,8 +217,7 @@ def cycle_gradient(cycle: Cycle, *, holding: Holding | None = None) -> Gradient:
         first = [(k % m, Fraction(0), Fraction(0)) for k in range(m + 1)]
         again = [((k + 1) % m, Fraction(1), Fraction(0)) for k in range(m)]
         points = zip(map(Fraction, cycle.loads.tolist()), cycle.heights, strict=True)
-        start = Fraction(0) if paths else known.load
-        along = Along(known, start, first + again, np.array([*points]))
+        along = Along(known, Fraction(cycle.start), first + again, np.array([*points]))
         return _gradient(contact, along, holding, paths=paths, sharp=cycle.order == "proved")
     amplitude = (max(cycle.heights) - min(cycle.heights)) / 2
     top, low = known.top, level_below(known, "maximum", amplitude, holding)

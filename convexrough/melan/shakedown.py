@@ -244,7 +244,7 @@ def _order(contact: Contact, onset: Onset, highest: float) -> Order:
             return "fails"
         try:
             levels = press(contact.scene, load=highest).cached(FrictionLevels)
-        except SolverError:
+        except (InputError, SolverError):  # also for loads beyond the range of numbers
             return "fails"
     return levels.order({onset.lower, onset.upper})
 

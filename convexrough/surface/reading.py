@@ -62,7 +62,8 @@ _SCALE = re.compile(
     re.I,
 )
 _CHANGED = re.compile(
-    r"\b(counts|digits|volts?|mV|waves|fringes|inch(?:es)?|mils?|thou|feet|ft|inverted|depths?|down|downwards|multiplied|divided|(?:nano|mi[ck]ro|milli)met\w+)\b",
+    r"\b(counts|digits|volts?|mV|waves|fringes|inch(?:es)?|mils?|thou|feet|ft|inverted|depths?|down"
+    r"|downwards|multiplied|divided|(?:nano|mi[ck]ro|milli)met\w+)\b",
     re.I,
 )
 

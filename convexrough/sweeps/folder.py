@@ -24,7 +24,7 @@ from convexrough.errors import FileError, file_errors, needed
 from convexrough.run.results import SWEEP_MANIFEST, SWEEP_PARTS, refuse_others, remove_earlier
 from convexrough.sweeps.batch import Columns, different
 
-MANIFEST, PARTS = SWEEP_MANIFEST, SWEEP_PARTS
+MANIFEST, PARTS, SCHEMA = SWEEP_MANIFEST, SWEEP_PARTS, 3
 
 #: Advice in messages: an argument in Python, and the option of the command in brackets.
 RESUME, OVERWRITE, OUT = "resume=True (--resume)", "overwrite=True (--force)", "`out` (--out)"
@@ -134,8 +134,10 @@ def open_folder(path: Path) -> Folder:
             if not (path / MANIFEST).exists():
                 raise FileError(f"{path}: not a sweep: there is no {MANIFEST}")
             manifest = json.loads((path / MANIFEST).read_text(encoding="utf-8"))
-        if not isinstance(manifest, dict) or manifest.get("schema") != 3:
-            raise ValueError("not a sweep of this version")
+        if not isinstance(manifest, dict) or manifest.get("schema") != SCHEMA:
+            found = manifest.get("schema") if isinstance(manifest, dict) else "none"
+            expected = f"{SCHEMA}: delete the folder, or name another ({OUT})"
+            raise ValueError(f"schema: found {found}, expected {expected}")
     except ValueError as error:
         raise FileError(f"{path / MANIFEST}: cannot be read: {error}") from error
     return Folder(path, manifest)
@@ -174,8 +176,8 @@ def make_folder(path: Path, manifest: Mapping[str, Any], *, overwrite: bool = Fa
                 (path / PARTS).mkdir(exist_ok=True)
                 write_text(path / MANIFEST, to_json(manifest) + "\n")
         folder = folder_of(path, manifest)
-        for file in (path / PARTS).glob(f"{'[0-9]' * 12}-{'[0-9a-f]' * 12}.parquet"):
-            if not file.name.endswith(folder.ending):  # of another sweep
+        for file in (path / PARTS).glob(f"*{'[0-9]' * 12}-{'[0-9a-f]' * 12}.parquet*"):
+            if folder.ending not in file.name:  # of another sweep
                 file.unlink(missing_ok=True)
     return folder
 

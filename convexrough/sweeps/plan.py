@@ -21,6 +21,7 @@ from convexrough.run.study import RANDOM, Study, validate, validate_table
 from convexrough.scene.scene import Scene
 from convexrough.solvers import Newton
 from convexrough.sweeps.batch import VERSIONS, Batch, Source, Tables, Tasks
+from convexrough.sweeps.folder import SCHEMA
 from convexrough.sweeps.grid import WHERE, Grid, swept, table_in, with_values
 from convexrough.sweeps.measures import FAILURES, Column, Stages, chosen, unit
 from convexrough.tabular.units import UnitNames
@@ -75,7 +76,9 @@ def plan_of(
     if grid is None:
         varied = {key.partition(".")[0] for _, key in swept(table_in(contents, "sweep"))}
         others = validate({name: it for name, it in tables.items() if name not in varied})[1]
-        unknown = ["missing table", *["[asperities] seed: missing"] * ("seeds" in table)]
+        unknown = ["missing table"]
+        if "seeds" in table_in(contents, "sweep"):
+            unknown.append("[asperities] seed: missing")
         rest = [each for each in others if not any(it in each for it in unknown)]
         raise SceneFileError(str(path), [*mistakes, *random, *rest])
     study, mistakes = _of_values(grid, tables)
@@ -109,7 +112,8 @@ def _of_values(grid: Grid, tables: Mapping[str, Any]) -> tuple[Study | None, lis
     axes = [("together", grid.together), *(("over", {key: it}) for key, it in grid.over.items())]
     for where, lists in axes:
         mistakes = [_placed(each, where, lists, 0) for each in mistakes]
-        for i, row in enumerate([*zip(*lists.values(), strict=True)][1:] if study else (), 1):
+        rows = list(zip(*lists.values(), strict=True)) if study else []
+        for i, row in enumerate(rows[1:], 1):
             values = {**first, **dict(zip(lists, row, strict=True))}
             _, wrong = validate(with_values(tables, values, seed))
             mistakes += [_placed(each, where, lists, i) for each in wrong]
@@ -215,7 +219,7 @@ def _planned(
         own = [name for name, stage in asked.stages.items() if name in used and stage.highest_load]
         own_loads = [it for it in own if not any(key.startswith(f"{it}.") for key in labels)]
     manifest = {
-        "schema": 3,
+        "schema": SCHEMA,
         "version": __version__,
         "sweep": inputs.hexdigest(),
         "scenes": source.count,

@@ -42,7 +42,7 @@ def describe(summary: Summary) -> list[str]:
     if left_out := it["not_measured"]:
         lines.append(("left out", f"{', '.join(map('[{}]'.format, left_out))}: nothing measured"))
     lines.append(("folder", it["folder"]))
-    return [*labelled(lines, 12), *incomplete(summary)]
+    return labelled(lines, 12)
 
 
 def incomplete(summary: Summary) -> list[str]:

@@ -6,6 +6,7 @@ import re
 import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -161,10 +162,14 @@ def _matlab(path: Path) -> dict[str, Any]:
     with foreign():
         found = loadmat(str(path), appendmat=False, simplify_cells=True)
     named = {name: each for name, each in found.items() if not name.startswith("__")}
-    only = next(iter(named.values()), None)
+    only = next(iter(named.values())) if len(named) == 1 else None
     if isinstance(only, list) and only and all(isinstance(each, dict) for each in only):
-        only = {name: np.array([each[name] for each in only]) for name in only[0]}
-    return only if len(named) == 1 and isinstance(only, dict) else named
+        for (k, each), name in product(enumerate(only, 1), only[0]):
+            if (count := np.size(each[name])) != 1:
+                said = f"{count} values in {name} of structure {k}, expected one in each"
+                raise FileError(f"{path}: found {said}")
+        return {name: np.array([each[name] for each in only]) for name in only[0]}
+    return only if isinstance(only, dict) else named
 
 
 def _parquet(path: Path) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from scenes import random_scenes
 
 import convexrough as cr
 from convexrough.arrays import Array
+from convexrough.friction import walk
 from convexrough.friction.curve import MemoryCurve
 
 #: On the paper's scene after each point: X, W, front over the largest load, how many slide and
@@ -241,7 +242,7 @@ def test_where_order_fails() -> None:
         assert_allclose(bristles.forces, fine.asperity_forces[k], atol=5e-3 * Q.max())
 
 
-def test_without_order_a_cycle_is_repeated_until_its_loss_settles() -> None:
+def test_without_order_a_cycle_is_repeated_until_its_loss_settles(monkeypatch: Any) -> None:
     scene = shaded()
     load = cr.press(scene, approach=1.4).load
     loads, forces = load * np.array([1.0, 0.7]), load * np.array([0.2, 0.32])
@@ -252,6 +253,11 @@ def test_without_order_a_cycle_is_repeated_until_its_loss_settles() -> None:
     later = np.diff(losses[2::2])
     assert later[0] > 2 * later[-1]  # the second cycle is not the steady one
     assert cycle.loss == pytest.approx(later[-1], abs=1e-3 * losses[2])
+    monkeypatch.setattr(walk, "STEADY", -1.0)  # it never settles
+    unsettled = cr.steady(scene, loads=loads, forces=forces)
+    assert np.isnan([unsettled.loss, unsettled.level]).all()
+    (_, chart) = cr.plots.steady_figures(unsettled)["steady"].axes
+    assert chart.get_title("left") == "the loss does not settle"
 
 
 def test_integers_of_numpy() -> None:

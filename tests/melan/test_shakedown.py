@@ -303,3 +303,5 @@ def test_an_undecided_asperity_leaves_the_limit_open(kind: Any) -> None:
     assert cr.press(scene, load=0.0129).status[2] == "undecided"
     found = cr.shakedown(scene, load=0.0129, force_amplitudes=swung(kind, 6e-4), kind=kind)
     assert found.lower == 0.0
+    cycle = cr.steady(scene, loads=[0.0129] * 2, forces=[0.003, -0.003])
+    assert cycle.slip_errors[2] > 0.01  # it may slide
