@@ -73,7 +73,9 @@ class PressedRows(NamedTuple):
         half = (Ball.exact(upper) - Ball.exact(lower)) * 0.5
         drop = (half / f).scaled(1.0 / units.force)
         total = high.load - drop
-        inside = (half.value > 0) & (total.value > AT_THE_END * ROUNDOFF * high.load.value)
+        limit = friction * high.load.value * units.force
+        ends = np.maximum(np.abs(upper), np.abs(lower)) >= (1 - AT_THE_END * ROUNDOFF) * limit
+        inside = (half.value > 0) & (total.value > AT_THE_END * ROUNDOFF * high.load.value) & ~ends
         total = where(inside, total, high.load)[:, None]  # rows not `inside` are not proved
         rows = self.stack.at_load(total)
         level, good = solved(rows, self.box.closed(rows))

@@ -25,7 +25,7 @@ from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.levels import FrictionLevels, rounded
 from convexrough.friction.onset import indices
 from convexrough.friction.order import Order
-from convexrough.friction.state import shared, states_of
+from convexrough.friction.state import States, shared, states_of
 from convexrough.friction.walk import Closed, Walk
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
@@ -147,8 +147,8 @@ class Cycle(Table, Plottable):
 
         The values are nan if general steps give the results (see `order`). Where the load varies,
         they are sums over about 64 cells of the ranges of load through which slip fronts move.
-        Their relative errors are about 0.1 %, except where a front hardly moves while the load
-        changes much. The proved bounds on the relative errors are some per cent.
+        Their relative errors are about 0.1 % if the load changes little, and some per cent if it
+        falls to 0. The proved bounds on the relative errors are some per cent.
         """
         return self._shares[2]
 
@@ -239,7 +239,8 @@ class Loop(Table):
         of distant points of the two bodies
     asperity_forces : (m, k) [force] shear force on each of these asperities
     asperity_displacements : (m, k) [length] for each of these asperities, the displacement that its
-        own shear force causes, plus its drift (its slip, while it touches): docs/theory/paths.md
+        own shear force causes, plus its drift (its slip, while it touches): docs/theory/paths.md;
+        0 where open
 
     >>> loop = cr.cycle(contact, maximum=0.25 * contact.load).loop(points=100)
     >>> len(loop.forces), loop.asperity_forces.shape
@@ -268,7 +269,7 @@ class Loop(Table):
 def loops(
     cycles: Sequence[Cycle], points: int = 200, asperities: ArrayLike | None = None
 ) -> list[Loop]:
-    """The force-displacement loops of several cycles of one contact at constant load.
+    """The force-displacement loops of several cycles at constant load.
 
     points : approximate number of points of the widest loop; narrower loops have fewer
     asperities : as in `Cycle.loop`
@@ -283,32 +284,39 @@ def loops(
     checks.sequence("cycles", cycles, "a list of cycles; `Cycle.loop` is for one")
     if not cycles:
         return []
-    contact = cycles[0].contact
+    for k, each in enumerate(cycles):
+        checks.instance(f"cycles[{k}]", each, Cycle)
     if any(np.ptp(each.loads) > 0 for each in cycles):
         raise InputError("cycles", found="a load that varies", expected="cycles at constant load")
-    chosen = indices("asperities", asperities, len(contact.scene))
     most = points // 2 * max(len(each.heights) for each in cycles)
-    checks.fits_in_memory("points", most, 200 * len(contact.scene), noun="levels")
-    levels, f = contact.cached(FrictionLevels), Fraction(checks.friction(contact.scene.friction))
-    loaded = levels.loads[chosen] > 0
+    largest = max(len(each.scene) for each in cycles)
+    checks.fits_in_memory("points", most, 200 * largest, noun="levels")
     widest = max(each.force_amplitude for each in cycles)
     parts = (0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, points // 2 + 1)))[1:-1]
-    way = [2 * Fraction(widest * part) / f for part in parts.tolist()]
-    found = list[Loop]()
-    for each in cycles:
-        top, bottom = max(each.heights), min(each.heights)
-        heights, k = [top], each.heights.index(top)
-        for here, there in pairwise([*each.heights[k:], *each.heights[:k], top]):
-            run, sign = abs(there - here), 1 if there > here else -1
-            heights += [here + sign * part for part in way if part < run] + [there] * (run > 0)
-        LOGGER.info(f"computing {len(heights)} levels of a loop")
-        path = [(levels.load, height) for height in (top, bottom, *heights)]
-        walk = Walk(levels, MemoryCurve.pressed(levels.load), path, steps=1)
-        if each.order == "fails" and levels.proved:
-            states, some = walk.states(), chosen
-        else:
-            states, some = states_of(levels, walk.curves, chosen), np.arange(len(chosen))
-        forces, displacements = states.forces.value, states.asperity_displacements.value
-        own = (frozen(np.where(loaded, it[2:, some], 0.0)) for it in (forces, displacements))
-        found.append(Loop(chosen, walk.forces[2:], frozen(states.displacements.value[2:]), *own))
-    return found
+    way = [2 * Fraction(widest * part) for part in parts.tolist()]
+    return [_loop(each, way, indices("asperities", asperities, len(each.scene))) for each in cycles]
+
+
+def _loop(cycle: Cycle, way: Sequence[Fraction], chosen: Indices) -> Loop:
+    """The loop through the points of a cycle, and those at distances `way` [force] behind each."""
+    levels, f = cycle._walk.levels, Fraction(checks.friction(cycle.scene.friction))
+    top, general = max(cycle.heights), cycle._walk.general
+    heights, k = [top], cycle.heights.index(top)
+    for here, there in pairwise([*cycle.heights[k:], *cycle.heights[:k], top]):
+        run, sign = f * abs(there - here), 1 if there > here else -1
+        heights += [here + sign * part / f for part in way if part < run] + [there] * (run > 0)
+    LOGGER.info(f"computing {len(heights)} levels of a loop")
+    if general is None:  # one cycle, up to the largest shear force
+        past = [*cycle.heights, *cycle.heights[:k]]
+    else:
+        past = [*cycle.heights[:k], *heights[:-1] * len(cycle._walk.losses_of(general))]
+    path = [(levels.load, height) for height in (*past, *heights)]
+    walk, loop = Walk(levels, cycle._walk.start, path, steps=1), slice(len(past), None)
+    if general is None:
+        states, some = states_of(levels, walk.curves[loop], chosen), np.arange(len(chosen))
+    else:
+        states, some = States(*(each[loop] for each in walk.states())), chosen
+    loaded = levels.loads[chosen] > 0
+    forces, displacements = states.forces.value, states.asperity_displacements.value
+    own = (frozen(np.where(loaded, it[:, some], 0.0)) for it in (forces, displacements))
+    return Loop(chosen, walk.forces[loop], frozen(states.displacements.value), *own)

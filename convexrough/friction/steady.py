@@ -173,7 +173,7 @@ def _cycle(contact: Contact, closed: Closed, spent: Ball, moved: Ball) -> Cycle:
     """The result, from the losses `spent` of cycles 1 and 2 and the displacements `moved`."""
     levels, order, (stuck, stuck_height) = closed.levels, closed.order, closed.stuck
     (first, loss), (first_error, error) = spent.value, spent.error
-    half = (moved[int(np.argmax(moved.value))] - moved[int(np.argmin(moved.value))]) * 0.5
+    half = (_largest(moved) + _largest(-moved)) * 0.5
     amplitude = float(half.value)
     rest, top, bottom = (levels.at(s) for s in (stuck, levels.load, closed.least))
     slides, lost = bottom.touching & rest.open, top.touching & bottom.open
@@ -252,3 +252,13 @@ def _slips(closed: Closed, rest: Level, bottom: Level) -> tuple[Array, Array]:
     spread = partial(among_zeros, places=some, count=len(levels.candidates))
     found, off = np.where(sure, values, 0.0), np.where(sure, errors, np.abs(values) + errors)
     return levels.to_scene(spread(found)), levels.to_scene(spread(off))
+
+
+def _largest(numbers: Ball) -> Ball:
+    """The largest of m numbers, with all their digits."""
+    above = numbers - numbers[int(np.argmax(numbers.value))]
+    k = int(np.argmax(above.value))
+    more = np.inf
+    if np.isfinite(above.upper).all():
+        more = float(above.upper.max() - above.upper[k])  # if another may be larger
+    return Ball.around(numbers[k].mid, numbers[k].radius + more)

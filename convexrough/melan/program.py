@@ -50,7 +50,7 @@ def solve(contact: Contact, mean: Array, vertices: Array) -> dict[str, Any]:
         "upper": _upper(known, slips, mean, elastic, errors),
         "factors": np.where(contact.loads > 0, factor, np.nan),
         "gross": _largest(*whole)[1],
-        "witness": known.to_scene((rest - steady) * unit),
+        "witness": known.to_scene(rest * unit),
         "mechanism": among_zeros(slips / sizes.max(), known.touching, len(contact.scene), axis=1),
     }
 

@@ -20,6 +20,7 @@ from convexrough.errors import InputError, SolverError
 from convexrough.friction.levels import FrictionLevels
 from convexrough.friction.onset import MOST_ONSETS, Onset, enclosed, last_to_touch
 from convexrough.friction.order import Order
+from convexrough.friction.path import LEAST_PART
 from convexrough.influence import Kind
 from convexrough.melan.program import solve
 from convexrough.plottable import Plottable
@@ -176,6 +177,10 @@ def shakedown(
     if kind != "exact" and np.any(p):
         expected = 'none, as the kind is not "exact": the normal load must be constant'
         raise InputError("load_amplitudes", found=str([*map(float, p)])[:60], expected=expected)
+    size = float(max(np.abs(q).max() / f, np.abs(p).max()))
+    if size < LEAST_PART * P0:
+        expected = f"at least {LEAST_PART:g} of the load"
+        raise InputError("force_amplitudes", found=f"at most {size:g}", expected=expected)
     contact = press(scene, load=P0, influence=influence)
     if kind == "exact":
         limit = _exact(contact, t0, p, t)
@@ -223,14 +228,17 @@ def _exact(contact: Contact, t0: Fraction, p: Any, t: Any) -> dict[str, Any]:
     proved = proved and bool(levels.to_scene(sure.touching)[touching].all())
     height = float(t0) - (lower * float(plus - minus) / 2 if fall > 0 else 0.0)
     gaps = np.maximum(-levels.depths(worst.lower), 0.0) * (contact.loads > 0)
-    rest = levels.to_scene(sure.loads.value * levels.units.force)
+    at_last = worst.upper  # L* at the lower bound
+    if lower == float(gross) < np.inf:
+        at_last = P0 - Fraction(lower * (1 - SAFETY)) * fall
+    rest = levels.to_scene(levels.at(at_last).loads.value * levels.units.force)
     return {
         "factor": float(factors[last]),
         "lower": lower * (1 - SAFETY) if proved else 0.0,
         "upper": upper * (1 + SAFETY) if proved else np.inf,
         "factors": factors,
         "gross": float(gross),
-        "witness": height / (float(worst.upper) or 1.0) * rest,
+        "witness": height / (float(at_last) or 1.0) * rest,
         "mechanism": gaps / (gaps.max() or 1.0),
         "order": order,
     }

@@ -1,5 +1,6 @@
 """Cycles, histories, fretting: memory, energies counted in independent ways, many at once."""
 
+import math
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -135,6 +136,39 @@ def worn(high: float, low: float) -> tuple[cr.Cycle, cr.Fretting]:
     limit = 0.5 * contact.load
     cycle = cr.cycle(contact, maximum=high * limit, minimum=low * limit)
     return cycle, cr.fretting(cycle)
+
+
+def test_a_loop_remembers_how_the_cycle_began() -> None:
+    """Pressed and sheared at once, forces differ below L* from those of a pressed contact."""
+    contact = pressed("paper")
+    scene, P = contact.scene, contact.load
+    forces = FRICTION * P * np.array([0.4, 0.1])
+    cycles = [cr.steady(scene, loads=[load] * 2, forces=forces) for load in (P, 0.7 * P)]
+    for cycle, loop in zip(cycles, cr.loops(cycles, points=4), strict=True):
+        path = cr.load_path(scene, loads=[cycle.contact.load] * 5, forces=forces[[0, 1, 0, 1, 0]])
+        touching = path.asperity_loads[-1] > 0
+        assert_allclose(loop.asperity_forces[0], path.asperity_forces[-1], rtol=1e-13, atol=1e-30)
+        assert loop.displacements[0] == pytest.approx(path.displacements[-1], rel=1e-13)
+        own = path.asperity_displacements[-1][touching]
+        assert_allclose(loop.asperity_displacements[0][touching], own, rtol=1e-12)
+    with pytest.raises(cr.InputError, match=r"cycles\[1\]: found type int"):
+        cr.loops([cycles[0], 3])  # type: ignore[list-item]
+
+
+def test_amplitudes_of_forces_that_differ_by_a_last_bit() -> None:
+    contact = pressed("paper")
+    limit = limit_of(contact)
+    stiffness = cr.cycle(contact, maximum=1e-6 * limit).secant_stiffness
+    for q in (limit * np.linspace(0.2, 0.4, 30)).tolist():
+        cycle = cr.cycle(contact, maximum=q, minimum=math.nextafter(q, 0.0))
+        assert cycle.secant_stiffness == pytest.approx(stiffness, rel=1e-3)
+        forces = [q, -0.5 * q, q, math.nextafter(-0.5 * q, -1.0)]
+        many, two = (
+            cr.steady(contact.scene, loads=[contact.load] * len(each), forces=each)
+            for each in (forces, forces[2:])
+        )
+        apart = abs(many.displacement_amplitude - two.displacement_amplitude)
+        assert apart <= many.displacement_error + two.displacement_error
 
 
 @pytest.mark.sample(2)

@@ -305,3 +305,20 @@ def test_an_undecided_asperity_leaves_the_limit_open(kind: Any) -> None:
     assert found.lower == 0.0
     cycle = cr.steady(scene, loads=[0.0129] * 2, forces=[0.003, -0.003])
     assert cycle.slip_errors[2] > 0.01  # it may slide
+
+
+@pytest.mark.parametrize("kind", ["exact", "elastic", "vector"])
+def test_witnesses_respect_friction_and_carry_the_mean_force(kind: Any) -> None:
+    contact = cr.press(PAPER, load=3.5e-7)
+    limits, mean = 0.5 * contact.loads, 0.8 * 0.5 * contact.load
+    forces = swung(kind, 0.05 * contact.load)
+    force = [mean, 0.0] if kind == "vector" else mean
+    found = cr.shakedown(PAPER, load=contact.load, force=force, force_amplitudes=forces, kind=kind)
+    witness = found.witness.reshape(len(PAPER), -1)
+    assert found.proved
+    assert found.factor == pytest.approx(found.gross)
+    assert (np.linalg.norm(witness, axis=1) <= limits).all()
+    assert witness.sum(axis=0)[0] == pytest.approx(mean)
+    tiny = np.multiply(forces, 1e-310 / np.max(forces))
+    with pytest.raises(cr.InputError, match="force_amplitudes: found at most 2e-310"):
+        cr.shakedown(PAPER, load=contact.load, force_amplitudes=tiny, kind=kind)
