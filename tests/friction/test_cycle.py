@@ -297,6 +297,15 @@ def test_what_rows_do_not_prove_is_done_one_by_one(monkeypatch: pytest.MonkeyPat
     assert cr.press_many(scenes, approach=5e-5).alone.tolist() == [0, 1, 2]
 
 
+def test_one_force_at_the_limit_counts_as_the_limit() -> None:
+    scene = replace(PAPER, friction=0.3)
+    load, limit = 3.5e-7, 0.3 * 3.5e-7
+    contacts, alone = cr.press_many([scene, scene], load=load), cr.press(scene, load=load)
+    for low in (limit * np.linspace(-0.9, 0.3, 20)).tolist():
+        many, one = contacts.cycles(limit, low), cr.cycle(alone, maximum=limit, minimum=low)
+        assert abs(many.losses[0] - one.loss) <= many.loss_errors[0] + one.loss_error
+
+
 def test_warnings_of_many() -> None:
     soft = replace(PAPER.material, hardness=1e-4)
     scenes = [*rough(2), *(replace(each, material=soft) for each in rough(2))]
