@@ -180,12 +180,16 @@ def _one_problem(
     known = list[tuple[str, Scene, str]]()
     for name, each in (("first", first), ("second", second)):
         if isinstance(each, Contact):
-            by_load = each.prescribed_load is not None
-            said = f"load {each.prescribed_load!r}" if by_load else f"approach {each.approach!r}"
+            P = each.prescribed_load
+            said = f"approach {float(each.approach)!r}" if P is None else f"load {float(P)!r}"
             known.append((name, each.scene, said))
     if scene is not None or approach is not None or load is not None:
-        said = f"approach {approach!r}" if load is None else f"load {load!r}"
-        known.append(("scene, approach, load", scene or known[0][1], said))
+        checks.exactly_one("approach", approach, "load", load)
+        given = known[0][1] if scene is None else scene
+        checks.instance("scene", given, Scene)
+        name, value = ("approach", approach) if load is None else ("load", load)
+        said = f"{name} {checks.finite(name, value)!r}"
+        known.append(("scene, approach, load", given, said))
     (start, wanted, control), *others = known
     for name, given, said in others:
         for part in ("contact_points", "offsets", "relative_radii"):

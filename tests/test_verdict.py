@@ -288,6 +288,8 @@ def test_two_that_agree(contact: cr.Contact, control: str) -> None:
     assert_agree(first, second)
     assert_agree(first, second, within=1e-3)
     assert_agree(second.loads, first, scene=paper(), **prescribed)
+    numbers = {name: np.float64(value) for name, value in prescribed.items()}
+    assert_agree(first, second.loads, scene=paper(), **numbers)
     message = failure(assert_agree, first, second, within=1e-6)
     assert message.startswith("first (newton) and second (bristles): loads differ by ")
     assert "expected 1e-06: asperities " in message

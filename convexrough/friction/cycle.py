@@ -219,7 +219,8 @@ class Cycle(Table, Plottable):
     def loop(self, points: int = 200, asperities: ArrayLike | None = None) -> Loop:
         """The loop of shear force against displacement, with points denser at its ends.
 
-        points     : approximate number of points of the outer loop; half of them on each branch
+        points     : approximate number of points of the outer loop, half of them on each branch;
+            points and reversals of the cycle add to them
         asperities : indices of the asperities whose own loops are returned; default all
 
         Raises InputError if the load varies.
@@ -288,9 +289,8 @@ def loops(
         checks.instance(f"cycles[{k}]", each, Cycle)
     if any(np.ptp(each.loads) > 0 for each in cycles):
         raise InputError("cycles", found="a load that varies", expected="cycles at constant load")
-    most = points // 2 * max(len(each.heights) for each in cycles)
     largest = max(len(each.scene) for each in cycles)
-    checks.fits_in_memory("points", most, 200 * largest, noun="levels")
+    checks.fits_in_memory("points", points, 200 * largest, noun="levels")
     widest = max(each.force_amplitude for each in cycles)
     parts = (0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, points // 2 + 1)))[1:-1]
     way = [2 * Fraction(widest * part) for part in parts.tolist()]
@@ -298,19 +298,26 @@ def loops(
 
 
 def _loop(cycle: Cycle, way: Sequence[Fraction], chosen: Indices) -> Loop:
-    """The loop through the points of a cycle, and those at distances `way` [force] behind each."""
+    """The loop through the points of a cycle, and points at the distances `way` [force] behind each
+    reversal.
+    """
     levels, f = cycle._walk.levels, Fraction(checks.friction(cycle.scene.friction))
     top, general = max(cycle.heights), cycle._walk.general
-    heights, k = [top], cycle.heights.index(top)
+    heights, k, turn, sign = [top], cycle.heights.index(top), top, 0
     for here, there in pairwise([*cycle.heights[k:], *cycle.heights[:k], top]):
-        run, sign = f * abs(there - here), 1 if there > here else -1
-        heights += [here + sign * part / f for part in way if part < run] + [there] * (run > 0)
+        if here == there:
+            continue
+        if sign != (sign := 1 if there > here else -1):
+            turn = here
+        near, far = f * abs(here - turn), f * abs(there - turn)
+        heights += [turn + sign * part / f for part in way if near < part < far] + [there]
     LOGGER.info(f"computing {len(heights)} levels of a loop")
     if general is None:  # one cycle, up to the largest shear force
         past = [*cycle.heights, *cycle.heights[:k]]
     else:
         past = [*cycle.heights[:k], *heights[:-1] * len(cycle._walk.losses_of(general))]
     path = [(levels.load, height) for height in (*past, *heights)]
+    checks.fits_in_memory("points", len(path), 200 * len(cycle.scene), noun="levels")
     walk, loop = Walk(levels, cycle._walk.start, path, steps=1), slice(len(past), None)
     if general is None:
         states, some = states_of(levels, walk.curves[loop], chosen), np.arange(len(chosen))

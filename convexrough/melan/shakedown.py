@@ -180,7 +180,8 @@ def shakedown(
     size = float(max(np.abs(q).max() / f, np.abs(p).max()))
     if size < LEAST_PART * P0:
         expected = f"at least {LEAST_PART:g} of the load"
-        raise InputError("force_amplitudes", found=f"at most {size:g}", expected=expected)
+        found = f"up to {size:g} (forces divided by f)"
+        raise InputError("force_amplitudes", found=found, expected=expected)
     contact = press(scene, load=P0, influence=influence)
     if kind == "exact":
         limit = _exact(contact, t0, p, t)
@@ -226,11 +227,11 @@ def _exact(contact: Contact, t0: Fraction, p: Any, t: Any) -> dict[str, Any]:
     order = _order(contact, worst, highest)
     proved = order == "proved" and bool((top.touching | top.open).all())
     proved = proved and bool(levels.to_scene(sure.touching)[touching].all())
-    height = float(t0) - (lower * float(plus - minus) / 2 if fall > 0 else 0.0)
     gaps = np.maximum(-levels.depths(worst.lower), 0.0) * (contact.loads > 0)
-    at_last = worst.upper  # L* at the lower bound
-    if lower == float(gross) < np.inf:
-        at_last = P0 - Fraction(lower * (1 - SAFETY)) * fall
+    # The point (L*, T*) at the lower bound, or at the factor 0 if there is no limit.
+    part = Fraction(lower * (1 - SAFETY)) if lower < np.inf else Fraction(0)
+    at_last = worst.upper if lower < min(float(gross), np.inf) else min(P0, P0 - part * fall)
+    height = min(max(t0 - part * (plus - minus) / 2, -at_last), at_last)
     rest = levels.to_scene(levels.at(at_last).loads.value * levels.units.force)
     return {
         "factor": float(factors[last]),
@@ -238,7 +239,7 @@ def _exact(contact: Contact, t0: Fraction, p: Any, t: Any) -> dict[str, Any]:
         "upper": upper * (1 + SAFETY) if proved else np.inf,
         "factors": factors,
         "gross": float(gross),
-        "witness": height / (float(at_last) or 1.0) * rest,
+        "witness": float(height / (at_last or 1)) * rest,
         "mechanism": gaps / (gaps.max() or 1.0),
         "order": order,
     }

@@ -36,6 +36,10 @@ def draw_quantiles(
         have bands of their own; otherwise the legend states the number of combinations
     """
     axes = new_axes((0.65 * DOUBLE, 3.0)) if axes is None else axes
+    named = columns[over].dtype.kind == "U"
+    names = list(dict.fromkeys(columns[over].tolist())) if named else []
+    if names:
+        axes.xaxis.update_units(names)  # type: ignore[no-untyped-call]  # in this order
     good = columns["status"] != "failed"
     rows = {name: values[good] for name, values in columns.items()}
     for (name, band), look in zip(_bands(rows, others), cycle(LOOKS), strict=False):
@@ -50,7 +54,9 @@ def draw_quantiles(
     low, high = axes.dataLim.intervaly
     if 0 < 300 * low < high:
         axes.set_yscale("log")
-    axes.margins(x=0.1 if x.dtype.kind == "U" else 0.02)
+    axes.margins(x=0.02)
+    if names:
+        axes.set_xlim(-0.5, len(names) - 0.5)
     legend(axes, "above", ncols=2)
     return axes
 

@@ -134,10 +134,10 @@ def open_folder(path: Path) -> Folder:
             if not (path / MANIFEST).exists():
                 raise FileError(f"{path}: not a sweep: there is no {MANIFEST}")
             manifest = json.loads((path / MANIFEST).read_text(encoding="utf-8"))
-        if not isinstance(manifest, dict) or manifest.get("schema") != SCHEMA:
-            found = manifest.get("schema") if isinstance(manifest, dict) else "none"
-            expected = f"{SCHEMA}: delete the folder, or name another ({OUT})"
-            raise ValueError(f"schema: found {found}, expected {expected}")
+        if not (isinstance(manifest, dict) and {"schema", "sweep", "versions"} <= manifest.keys()):
+            raise ValueError("not a sweep")
+        if (found := manifest["schema"]) != SCHEMA:
+            raise ValueError(f"a sweep of another version: found schema {found}, expected {SCHEMA}")
     except ValueError as error:
         raise FileError(f"{path / MANIFEST}: cannot be read: {error}") from error
     return Folder(path, manifest)

@@ -151,6 +151,9 @@ def test_a_loop_remembers_how_the_cycle_began() -> None:
         assert loop.displacements[0] == pytest.approx(path.displacements[-1], rel=1e-13)
         own = path.asperity_displacements[-1][touching]
         assert_allclose(loop.asperity_displacements[0][touching], own, rtol=1e-12)
+    turn = 2 * np.pi * np.arange(60) / 60
+    round_trip = cr.steady(scene, loads=[P] * 60, forces=0.2 * P * np.cos(turn))
+    assert 200 < len(round_trip.loop(200).forces) < 200 + 60  # not 200 behind each point
     with pytest.raises(cr.InputError, match=r"cycles\[1\]: found type int"):
         cr.loops([cycles[0], 3])  # type: ignore[list-item]
 

@@ -253,6 +253,12 @@ def test_without_order_a_cycle_is_repeated_until_its_loss_settles(monkeypatch: A
     later = np.diff(losses[2::2])
     assert later[0] > 2 * later[-1]  # the second cycle is not the steady one
     assert cycle.loss == pytest.approx(later[-1], abs=1e-3 * losses[2])
+    cycle = cr.steady(scene, loads=[load] * 2, forces=load * np.array([0.25, -0.05]))
+    every, some = cycle.loop(60), cycle.loop(60, asperities=[5, 2])
+    assert cycle.order == "fails"
+    assert every.area == pytest.approx(cycle.loss, rel=5e-3)
+    assert every.displacements[0] == pytest.approx(every.displacements[-1], rel=1e-6)
+    assert_allclose(some.asperity_forces, every.asperity_forces[:, [5, 2]])
     monkeypatch.setattr(walk, "STEADY", -1.0)  # it never settles
     unsettled = cr.steady(scene, loads=loads, forces=forces)
     assert np.isnan([unsettled.loss, unsettled.level]).all()

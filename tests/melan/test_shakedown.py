@@ -319,6 +319,14 @@ def test_witnesses_respect_friction_and_carry_the_mean_force(kind: Any) -> None:
     assert found.factor == pytest.approx(found.gross)
     assert (np.linalg.norm(witness, axis=1) <= limits).all()
     assert witness.sum(axis=0)[0] == pytest.approx(mean)
+    if kind == "exact":  # the load rises above the mean, until the whole contact slides
+        q = 0.5 * contact.load * np.array([-2.0, -2.1])
+        found = cr.shakedown(
+            PAPER, load=contact.load, load_amplitudes=contact.load, force_amplitudes=q
+        )
+        assert found.factor == found.gross
+        assert (np.abs(found.witness) <= limits * (1 + 1e-15)).all()
+        assert found.witness.sum() == pytest.approx(-limits.sum())
     tiny = np.multiply(forces, 1e-310 / np.max(forces))
-    with pytest.raises(cr.InputError, match="force_amplitudes: found at most 2e-310"):
+    with pytest.raises(cr.InputError, match="force_amplitudes: found up to 2e-310"):
         cr.shakedown(PAPER, load=contact.load, force_amplitudes=tiny, kind=kind)

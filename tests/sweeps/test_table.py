@@ -299,7 +299,7 @@ def test_a_folder_of_another_sweep_is_refused(folder: Path) -> None:
 
 def test_nothing_of_a_folder_that_is_no_sweep_is_removed(tmp_path: Path) -> None:
     (tmp_path / "manifest.json").write_text("{}")
-    with pytest.raises(cr.FileError, match="schema: found None, expected 3"):
+    with pytest.raises(cr.FileError, match="cannot be read: not a sweep"):
         swept(SMALL, out=tmp_path, overwrite=True)
     assert (tmp_path / "manifest.json").read_text() == "{}"
 
