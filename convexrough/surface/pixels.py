@@ -189,7 +189,8 @@ def copied(heights: Array) -> float:
 def filled(heights: Array) -> Array:
     """The map with filled holes (nan): each is the mean of the pixels that share a side with it.
 
-    So no filled pixel becomes a summit. At least one pixel must have a height.
+    So no filled pixel is higher than all pixels around it, except by rounding on a plateau. At
+    least one pixel must have a height.
     """
     holes = np.isnan(heights)
     if (count := np.count_nonzero(holes)) == 0:

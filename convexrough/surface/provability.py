@@ -91,11 +91,10 @@ class Provability(Table, Plottable):
     def trusted_from(self) -> float:
         """The smallest pruning that is trusted together with all stronger ones, apart from those
         that leave fewer than 5 contacts; nan if there is none."""
-        enough = np.flatnonzero(self.contacts >= FEW)
-        last = int(enough[-1]) + 1 if len(enough) else 0
-        doubted = np.flatnonzero(~self.trusted[:last])
-        first = int(doubted[-1]) + 1 if len(doubted) else 0
-        return float(self.prune[first]) if first < last else float("nan")
+        doubted = np.flatnonzero(~self.trusted & (self.contacts >= FEW))
+        rest = slice(int(doubted[-1]) + 1 if len(doubted) else 0, None)
+        trusted = self.prune[rest][self.trusted[rest]]
+        return float(trusted[0]) if len(trusted) else float("nan")
 
 
 def provability(summits: Summits, press: Press, *, levels: Sequence[float] = LEVELS) -> Provability:

@@ -18,6 +18,10 @@ from convexrough.sphere import ellipse
 from convexrough.surface.detrend import Removed
 from convexrough.surface.pixels import Moments
 
+#: A maximum is a ridge, without a top, if the product of the fitted principal curvatures is at most
+#: this part of their squared sum; on maps of coarse steps it may be 0, and positive by rounding.
+RIDGE = 1e-9
+
 
 @dataclass(frozen=True, repr=False)
 class Origin(Record):
@@ -213,9 +217,10 @@ def fit_tips(heights: Array, pixels: Indices, pixel: tuple[float, float], across
     fitted = np.linalg.pinv(terms) @ around.T
     _, gu, gv, huu, huv, hvv = fitted
     determinant = huu * hvv - huv**2
-    solid = np.where(determinant > 0, determinant, np.inf)
+    round_top = determinant > RIDGE * (huu + hvv) ** 2
+    solid = np.where(round_top, determinant, np.inf)
     top = np.stack(((huv * gv - hvv * gu) / solid, (huv * gu - huu * gv) / solid))
-    whole = (determinant > 0) & (huu < 0) & (np.abs(top) <= reach).all(axis=0)
+    whole = round_top & (huu < 0) & (np.abs(top) <= reach).all(axis=0)
 
     z0, gu, gv, huu, huv, hvv = fitted[:, whole]
     (u0, v0), (dx, dy) = top[:, whole], pixel

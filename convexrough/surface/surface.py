@@ -195,7 +195,7 @@ class Surface(Record, Plottable):
                 part = f"{100 * (1.0 - least / np.var(known)):.3g} %"
                 found = f"{name}, explains {part} of the variance of the heights: "
                 found += f'detrend="{kind}", or --detrend {kind}, removes it'
-            left = least
+                left = least
         return (*([found] if found else []), *self._wrong_pixels())
 
     def _wrong_pixels(self) -> Iterator[str]:

@@ -322,6 +322,8 @@ def test_prunings_that_leave_few_contacts_are_not_advised() -> None:
         assert_allclose(curve.trusted_from, first)
         assert curve.doubts[0] == "discs overlap"
         assert curve.doubts[-1] == "fewer than 5 contacts"
+    curve = curve_of(prune=[0.0, 0.1, 0.3, 0.5], contacts=[8, 8, 4, 5], crowding=[0.1] * 4)
+    assert curve.trusted_from == 0.0
 
 
 def said(figure: Any) -> set[str]:

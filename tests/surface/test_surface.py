@@ -94,6 +94,21 @@ def test_a_trend_that_explains_most_is_named() -> None:
         assert cr.surface.self_affine(0.8, 0.1, 256.0, seed).warnings == ()
 
 
+def test_a_ridge_has_no_top() -> None:
+    """The Hessian of the fitted paraboloid is singular, and positive by rounding."""
+    heights = np.full((7, 7), -9.0)
+    heights[2:5, 2:5] = [[-1, -3, 0], [-2, 1, -3], [-2, -1, -1]]
+    with pytest.raises(cr.InputError, match="without a fitted maximum"):
+        cr.surface.Surface(heights, 1.0).summits()
+
+
+def test_half_of_the_variance_names_a_form() -> None:
+    x, random = np.linspace(-1.0, 1.0, 64), np.random.default_rng(0)
+    heights = 0.6**0.5 * (1 / 3 - x**2) / np.std(x**2) + 0.4**0.5 * random.normal(size=(64, 64))
+    said = cr.surface.Surface(0.02 * heights, 1.0).detrend("plane").warnings[0]
+    assert said.startswith("a paraboloid")
+
+
 def test_a_map_pressed_whole_is_hertz_where_it_is_smooth() -> None:
     """Oblong pixels; load and area, and the half axes on an ellipsoid."""
     flat = cr.surface.Surface(1e-9 * RNG.standard_normal((201, 161)), (1.0, 1.2))
