@@ -307,7 +307,8 @@ def _loop(cycle: Cycle, way: Sequence[Fraction], chosen: Indices) -> Loop:
     for here, there in pairwise([*cycle.heights[k:], *cycle.heights[:k], top]):
         if here == there:
             continue
-        if sign != (sign := 1 if there > here else -1):
+        before, sign = sign, 1 if there > here else -1
+        if sign != before:
             turn = here
         near, far = f * abs(here - turn), f * abs(there - turn)
         heights += [turn + sign * part / f for part in way if near < part < far] + [there]

@@ -230,7 +230,7 @@ def _exact(contact: Contact, t0: Fraction, p: Any, t: Any) -> dict[str, Any]:
     gaps = np.maximum(-levels.depths(worst.lower), 0.0) * (contact.loads > 0)
     # The point (L*, T*) at the lower bound, or at the factor 0 if there is no limit.
     part = Fraction(lower * (1 - SAFETY)) if lower < np.inf else Fraction(0)
-    at_last = worst.upper if lower < min(float(gross), np.inf) else min(P0, P0 - part * fall)
+    at_last = worst.upper if lower < float(gross) else min(P0, P0 - part * fall)
     height = min(max(t0 - part * (plus - minus) / 2, -at_last), at_last)
     rest = levels.to_scene(levels.at(at_last).loads.value * levels.units.force)
     return {

@@ -36,8 +36,7 @@ def draw_quantiles(
         have bands of their own; otherwise the legend states the number of combinations
     """
     axes = new_axes((0.65 * DOUBLE, 3.0)) if axes is None else axes
-    named = columns[over].dtype.kind == "U"
-    names = list(dict.fromkeys(columns[over].tolist())) if named else []
+    names = list(dict.fromkeys(columns[over].tolist())) if columns[over].dtype.kind == "U" else []
     if names:
         axes.xaxis.update_units(names)  # type: ignore[no-untyped-call]  # in this order
     good = columns["status"] != "failed"
