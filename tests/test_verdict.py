@@ -98,6 +98,28 @@ def test_a_small_load_that_is_missing_does_not_pass() -> None:
     assert passed > 5  # whose statuses alone say that all is well
 
 
+def test_a_verdict_is_about_one_solution() -> None:
+    """Of two solutions, the certificate of these loads proves one, and Newton's method finds the
+    other. Both differ from the loads by 60 % of the largest load.
+    """
+    x = [-0.0162845424986, -0.0160084160543, -0.0096381664579, -0.0094958173350, 0.0115592395980]
+    y = [-0.0041901197099, -0.0040715169275, -0.0128326399868, -0.0127356954124, 0.0014032433119]
+    tips = [0.0250543610961, 0.0176714912943, 0.0237542897971, 0.0130631034335, 0.0227821938681]
+    heights = [8.54561406887e-06, 5.85066476367e-06, -7.42799161516e-06, 7.58512260295e-06,
+               -1.09425554780e-05]  # fmt: skip
+    positions = np.column_stack((x, y))
+    scene = cr.Scene(np.inf, cr.Asperities(positions, tips, heights), MATERIAL)
+    loads = [1.3560739e-09, 3.4691122e-08, 0.0, 4.5960501e-08, 7.4320817e-09]
+    approach = 2.6275812228551447e-05
+    other = cr.press(scene, approach=approach, start=loads)
+    verdict = cr.verify(scene, loads, approach=approach, within=0.5)
+    assert verdict.certificate.scope == "local"
+    assert verdict.solution is not None
+    assert other.status.tolist() != verdict.solution.status.tolist()
+    assert not verdict.holds
+    assert verdict.error > 0.59
+
+
 def test_wrong_loads_do_not_pass_as_true(contact: cr.Contact) -> None:
     half = 0.5 * contact.loads
     assert cr.verify(paper(), contact.loads, approach=PAPER_APPROACH)

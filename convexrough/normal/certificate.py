@@ -178,6 +178,12 @@ def certify(
 
 def certify_on(problem: NormalProblem, loads: Array) -> Certificate:
     """The certificate of the given `loads` (N,) [force] of all asperities of `problem.scene`."""
+    level, start = proved_near(problem, loads)
+    return certificate_of(level, loads, start)
+
+
+def proved_near(problem: NormalProblem, loads: Array) -> tuple[Level, Trial]:
+    """The level proved near given loads (N,) [force], and the trial of these loads."""
     given = loads[problem.candidates] / problem.units.force
     if problem.load is not None and not given.any():
         given = np.ones(len(given))
@@ -186,7 +192,7 @@ def certify_on(problem: NormalProblem, loads: Array) -> Certificate:
     if len(problem):
         better = proved(problem, refined(problem, start))
         level = level if better.box is None else better
-    return certificate_of(level, loads, start)
+    return level, start
 
 
 def certificate_of(level: Level, loads: Array, start: Trial) -> Certificate:

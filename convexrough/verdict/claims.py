@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
-from convexrough.contact import Contact, solve
-from convexrough.errors import InputError, TableError, blamed_on
+from convexrough.contact import Contact
+from convexrough.errors import InputError, SolverError, TableError, blamed_on
 from convexrough.friction.verdict import claims_sliding, verify_shear
 from convexrough.normal.claims import Claim, tolerance
 from convexrough.normal.problem import NormalProblem
@@ -108,12 +108,13 @@ def judged(
     """The verdict on loads and, if any are given, that on shear forces with the sum `force`."""
     tolerance("--within", within)
     with blamed_on(loads.path):
-        verdict = verify_on(problem, loads.values, within=within, floor=floor)
+        verdict = verify_on(
+            problem, loads.values, within=within, floor=floor, solved=forces is not None
+        )
     if forces is None:
         return [verdict]
-    contact = verdict.solution
-    if contact is None:
-        contact = solve(problem, start=np.where(verdict.claimed, verdict.loads, 0.0))
+    if (contact := verdict.solution) is None:
+        raise SolverError("no solution near the loads is found, so shear forces have no contact")
     sliding = _claimed_to_slide(forces, contact)
     with blamed_on("--shear-force"):
         sheared = verify_shear(contact, forces.values, force=force, within=within, sliding=sliding)

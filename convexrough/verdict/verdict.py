@@ -1,8 +1,8 @@
 """`verify`: compare claimed loads with what is proved about the solution.
 
 Unless the certificate of the loads proves the whole claim, with errors of at most 1 %, Newton's
-method computes a solution: from these loads or, if that fails, from its default start. The
-certificate of the solution shows which loads are wrong. `friction.verdict` compares shear forces
+method computes a solution. Its certificate shows which loads are wrong. If there may be several
+solutions, both certificates must be about the same one. `friction.verdict` compares shear forces
 with a solution.
 """
 
@@ -21,11 +21,13 @@ from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact, solve
 from convexrough.errors import InputError, SolverError
 from convexrough.influence.coupling import Kind
-from convexrough.normal.certificate import Certificate, certify_on
+from convexrough.normal.certificate import Certificate, certificate_of, proved_near
 from convexrough.normal.claims import WITHIN, Claim, tolerance
+from convexrough.normal.level import Level
 from convexrough.normal.problem import NormalProblem
 from convexrough.plottable import Plottable
 from convexrough.record import Along, Table
+from convexrough.roundoff import SAFETY
 from convexrough.scene.scene import Scene
 from convexrough.tabular.columns import bound
 
@@ -41,9 +43,9 @@ class Verdict(Claim, Table, Plottable):
     scene, loads, floor, within : as in `verify`
     total_prescribed : [force] the prescribed total load; None if the approach is prescribed
     certificate : certificate of the given loads, with 0 for loads up to the floor
-    solution    : the contact that Newton's method finds from the given loads or, if it fails, from
-        its default start; None if it finds none, or if the certificate proves the whole claim, with
-        errors of at most 1 %
+    solution    : the contact that Newton's method finds near the given loads or, if it fails, from
+        its default start; None if it finds none, if this may be another solution than that of
+        `certificate`, or if `certificate` proves the whole claim, with errors of at most 1 %
 
     >>> verdict = cr.verify(scene, contact.loads, approach=5e-5)
     >>> verdict.holds, verdict.decided_alone, list(verdict.hints()), verdict.nearby()
@@ -156,9 +158,14 @@ def verify(
 
 
 def verify_on(
-    problem: NormalProblem, loads: ArrayLike, *, within: float = WITHIN, floor: float = 0.0
+    problem: NormalProblem,
+    loads: ArrayLike,
+    *,
+    within: float = WITHIN,
+    floor: float = 0.0,
+    solved: bool = False,
 ) -> Verdict:
-    """The verdict of `verify` for an assembled problem."""
+    """The verdict of `verify` for an assembled problem; if `solved`, with the solution always."""
     floor = checks.between("floor", floor, 0, checks.LARGEST)
     within = tolerance("within", within)
     checks.in_order("loads", loads)
@@ -171,13 +178,29 @@ def verify_on(
         raise InputError(f"loads[{first}]", found=given[first], expected=expected)
     claimed = np.where(given > floor, given, 0.0)
     total = None if problem.load is None else problem.load * problem.units.force
-    certificate = certify_on(problem, claimed)
+    level, trial = proved_near(problem, claimed)
+    certificate = certificate_of(level, claimed, trial)
     verdict = Verdict(problem.scene, given, floor, within, total, certificate)
-    if verdict.holds and verdict.error <= WITHIN:
+    if verdict.holds and verdict.error <= WITHIN and not solved:
         return verdict
+    if level.box is not None:
+        claimed = problem.to_scene(level.loads.value * problem.units.force)
     for start in (claimed, None):  # Newton's method may diverge from inaccurate loads
         try:
-            return replace(verdict, solution=solve(problem, start=start))
+            found = solve(problem, start=start)
         except SolverError:
             continue
+        if certificate.scope != "local" or _is_solution_of(level, found):
+            return replace(verdict, solution=found)
     return verdict  # without a solution, only the certificate of the loads proves statuses
+
+
+def _is_solution_of(level: Level, contact: Contact) -> bool:
+    """True if the contact is proved to lie in the box of the level, which has one solution."""
+    problem, box, judged = level.problem, level.box, contact.certificate
+    if box is None or judged.scope == "none":
+        return False
+    most = ((contact.loads + judged.load_errors) * (1 + SAFETY))[problem.candidates]
+    inside = most <= box.loads * problem.units.force * (1 - SAFETY)
+    is_open = judged.status[problem.candidates] == "open"
+    return bool((is_open | (inside & ~box.fixed_open)).all())
