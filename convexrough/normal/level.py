@@ -385,8 +385,7 @@ def energies(levels: Sequence[Level]) -> Ball:
         found = Ball.exact(trial).dot(per_load)
         # The energy of trial loads P exceeds the least energy at their total by at most the sum of
         # e_i |P_i - P*_i|, for the solution P* and e = `excess`.
-        loads = _stacked(loaded, "loads")
-        off = loads.error + np.abs(loads.mid.low)
+        off = (Ball.exact(trial) - _stacked(loaded, "loads")).size
         above = (excess(gap, trial.high > 0) * off).sum(axis=-1) * (1 + SAFETY)
         uncertainty = np.array([float(level.load.radius) for level in loaded])
         rate = np.array([float(level.approach.size) for level in loaded])

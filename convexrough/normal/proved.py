@@ -100,7 +100,7 @@ def solution_in(problem: NormalProblem, box: Box, state: Trial) -> tuple[Any, Ar
     known = state.indentation
     indentation = Ball.around(known.mid, known.radius + (moved + shift))
     opened = indentation.negative
-    loads = Ball.around(state.loads, np.where(opened, 0.0, errors))
+    loads = Ball.around(state.loads, np.where(opened, state.loads.high, errors))  # open: 0
     if (loads.radius > POOR * loads.mid.high).any():
         loads = elementwise(_or_by_law, loads, indentation, problem.exact.coefficients)
     approach = Ball.around(state.approach.mid, shift)

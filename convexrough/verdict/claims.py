@@ -108,12 +108,13 @@ def judged(
     """The verdict on loads and, if any are given, that on shear forces with the sum `force`."""
     tolerance("--within", within)
     with blamed_on(loads.path):
-        verdict = verify_on(
-            problem, loads.values, within=within, floor=floor, solved=forces is not None
-        )
-    if forces is None:
-        return [verdict]
-    if (contact := verdict.solution) is None:
+        verdict = verify_on(problem, loads.values, within=within, floor=floor)
+        if forces is None:
+            return [verdict]
+        contact = verdict.solution
+        if contact is None:
+            contact = verify_on(problem, loads.values, floor=floor, solved=True).solution
+    if contact is None:
         raise SolverError("no solution near the loads is found, so shear forces have no contact")
     sliding = _claimed_to_slide(forces, contact)
     with blamed_on("--shear-force"):

@@ -48,8 +48,8 @@ from convexrough.normal.boxes import (
     tried,
 )
 from convexrough.normal.problem import NormalProblem
-from convexrough.normal.proved import solution_in
-from convexrough.normal.refine import trial
+from convexrough.normal.proved import proved, solution_in
+from convexrough.normal.refine import trial, trial_of
 from convexrough.solvers import Newton
 
 
@@ -453,9 +453,9 @@ def test_overlapping_shells(seed: int, count: int, width: float) -> None:
 
 def test_an_isolated_pair_is_proved_up_to_pi() -> None:
     A = DenseInfluence.assemble(np.array([[0.0, 0.0], [1.0, 0.0]]), 1.0)
-    for crowding, proved in ((1.6, True), (3.0, True), (3.13, True), (np.pi, False), (3.2, False)):
+    for crowding, convex in ((1.6, True), (3.0, True), (3.13, True), (np.pi, False), (3.2, False)):
         lengths = np.full(2, crowding / np.pi)
-        assert (overlapping_margin(A, lengths, CROWDED_MARGINS) > 0) == proved
+        assert (overlapping_margin(A, lengths, CROWDED_MARGINS) > 0) == convex
 
 
 @settings(max_examples=25, deadline=None)
@@ -525,3 +525,16 @@ def test_poor_loads_of_a_prescribed_total_do_not_exclude_another_solution() -> N
     assert [each.scope for each in found] == ["local"] * 3
     assert found[1].status[13] == found[2].status[14] == "contact"
     assert found[1].status[14] == found[2].status[13] == "open"
+
+
+def test_no_load_is_proved_on_an_open_asperity() -> None:
+    """Loads may be too small to be corrected: then the gap is proved in spite of them."""
+    contact = cr.press(paper(), approach=PAPER_APPROACH)
+    problem = NormalProblem.assemble(paper(), approach=PAPER_APPROACH)
+    loads = contact.loads[problem.candidates] / problem.units.force
+    k = int(np.flatnonzero(loads == 0)[0])
+    loads[k] = 1e-25 * loads.max()
+    level = proved(problem, trial_of(problem, loads))
+    assert level.open[k]
+    assert not level.touching[k]
+    assert level.loads.lower[k] <= 0 <= level.loads.upper[k]
