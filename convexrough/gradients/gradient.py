@@ -41,7 +41,7 @@ class Number:
     value: Ball  # J
     parts: Sequence[Part]  # of J that come from levels
     slopes: Moves  # derivatives of J at constant offsets d, coefficients k and matrix A
-    steep: Mapping[str, float]  # for infinite ones of them, numbers of the same sign
+    steep: Mapping[str, float]  # those that are infinite, or nan if this is not certain
     sides: Mapping[str, Array]  # for "forces" or "loads" of a path: (m, 2) from below and above
 
     @classmethod
@@ -54,7 +54,9 @@ class Number:
             for name, rate in part.moves.items():
                 slopes[name] = slopes.get(name, ZERO) + part.slopes.load * rate
                 if part.level.trial is None and part.weight.size > 0.0:
-                    steep[name] = float((part.weight * rate).value)
+                    growth = part.weight * rate
+                    sure = bool(growth.positive | growth.negative)
+                    steep[name] = float(np.copysign(np.inf, growth.value)) if sure else np.nan
         return cls(top, value, parts, slopes, steep, sides)
 
     def times(self, factor: Ball, **slopes: Ball) -> Number:
@@ -246,7 +248,7 @@ class Gradient(Table, Plottable):
         for name, ball in shown.whole.items():
             found[name], found[f"{name}_error"] = float(ball.value), float(ball.error)
         for name, steep in shown.steep.items():
-            found[name], found[f"{name}_error"] = float(np.copysign(np.inf, steep)), 0.0
+            found[name], found[f"{name}_error"] = steep, np.inf if np.isnan(steep) else 0.0
         for name, sides in shown.sides.items():
             one, slopes = name.removesuffix("s"), shown.slopes[name]
             found[name] = frozen(slopes.value.copy())

@@ -9,6 +9,7 @@ displacements and slips to c_t f, and shear forces of asperities to f.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from fractions import Fraction
 from itertools import accumulate
 from typing import Any
@@ -92,7 +93,7 @@ def contact_gradient(
     """The result of `Contact.gradient`."""
     holding = control_held(contact, holding)
     top, (on_loads, on_gaps, D, P) = levels(contact).top, _checked(contact, weights)
-    on_loads, units = on_loads + P, top.problem.units
+    units = top.problem.units
     far = np.setdiff1d(np.flatnonzero(on_gaps), top.problem.candidates)
     if len(far):  # they become candidates, which are open
         assert top.trial is not None
@@ -101,10 +102,11 @@ def contact_gradient(
         wider = top.problem.widened(which)
         top = proved(wider, refined_loads(wider, among_zeros(known, places, len(which))))
     which = top.problem.candidates
+    carried = (Ball.exact(on_loads[which]) + P) * units.force
     part = Part(
         top,
         approach=Ball.exact(D) * units.length,
-        loads=Ball.exact(on_loads[which]) * units.force if on_loads.any() else None,
+        loads=carried if carried.size.any() else None,
         indentations=_where_open(top, -on_gaps[which]) * units.length if on_gaps.any() else None,
         moves=by_load(units),
     )
@@ -122,16 +124,20 @@ def state_gradient(
     sign = -1.0 if state.force < 0 else 1.0
     top, low = known.top, level_below(known, "force", state.height, holding)
     which, travel = top.problem.candidates, known.travel_unit
-    weight = travel * (sign * X)
+    weight = travel * (sign * X) if X else ZERO
     # Q_i = f (P_i(P) - P_i(L));  X = c_t f (D0(P) - D0(L));  slips are c_t f times gaps at L
     carried = known.force_unit * Ball.exact(sign * on_forces[which])
     slid = _where_open(low, -sign * on_slips[which]) * travel
-    slid = balls.where(~top.open, slid, 0.0 * slid)
+    slid = balls.where(top.open, 0.0 * slid, slid)
+    if top.box is not None and (unsure := ~top.touching & ~top.open).any():
+        slid = balls.where(unsure, Ball.around(np.zeros(len(unsure)), slid.size), slid)
     moves = by_forces(known, top.load - low.load, force=sign)
     parts = [
         Part(top, approach=weight, loads=carried, moves=by_load(known.units)),
-        Part(low, approach=-weight, loads=-carried, indentations=slid, moves=moves),
+        Part(low, approach=-weight, loads=-carried, moves=moves),
     ]
+    if on_slips.any():
+        parts[1] = replace(parts[1], indentations=slid)
     moved = weight * (top.approach - low.approach) + slid.dot(low.indentation)
     borne = carried.dot(top.loads - low.loads)
     explicit = at_fixed_levels(known, displacement=moved, force=borne)

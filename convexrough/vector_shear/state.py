@@ -8,7 +8,6 @@ from that of the shear force (docs/theory/vector-friction.md).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import ClassVar, Protocol
 
 import numpy as np
@@ -57,7 +56,8 @@ class VectorShearState(Table, Plottable):
         length of the difference
     solver, iterations : name of the solver, and its number of steps
 
-    At |Q| = f P the forces are f P_i along Q. If these forces displace the asperities by different
+    As in `shear`, Q counts as f P if |Q| and f P differ only by rounding. At |Q| = f P the forces
+    are f P_i along Q. If these forces displace the asperities by different
     amounts perpendicular to Q, this state is the limit of an infinite displacement. The
     displacement, the slips, `residual` and `duality_gap` are then infinite.
 
@@ -123,27 +123,32 @@ def shear_vector(
     problem = contact.cached(FrictionProblem)
     exact = Ball.exact(Q) / friction / problem.units.force
     height = problem.levels.height(size)
+    force_error = 0.0
     if size == 0.0:
         nothing = np.zeros((len(problem), 2))
         state = VectorState(np.zeros(2), nothing, np.zeros(2), nothing, 0)
-    elif height == problem.levels.load:
+    elif height == problem.levels.load:  # Q counts as f P
+        exact = exact / (exact * exact).sum().sqrt() * problem.levels.top.load
+        limit = exact * problem.levels.force_unit
+        Q, force_error = limit.value, float(np.hypot(*limit.error) * (1 + SAFETY))
         state = _gross(problem, exact.value)
     else:
         state = _solved(solver, problem, exact.value)
     unit, travel = problem.force_unit, problem.travel_unit
     known = certify_vectors(problem, state, exact)
     left = np.maximum(1.0 - problem.sizes(state.increments) / problem.loads, 0.0)
+    forces = problem.to_scene(state.increments * unit)
     return VectorShearState(
         contact=contact,
         force=frozen(Q),
         displacement=frozen(_times(state.displacement, travel)),
-        forces=frozen(problem.to_scene(state.increments * unit)),
+        forces=frozen(forces),
         slips=frozen(problem.to_scene(state.slips * travel)),
         stick_radii=frozen(contact.contact_radii * problem.to_scene(np.cbrt(left))),
-        disagreement=_disagreement(problem, state, height),
+        disagreement=_disagreement(forces, contact, Q),
         residual=problem.residual(state),
         duality_gap=(known.excess + _rounding(problem, state)) * unit * travel,
-        certificate=_certificate(contact, problem, state, known),
+        certificate=_certificate(contact, problem, state, known, force_error),
         solver=solver.name,
         iterations=state.iterations,
     )
@@ -213,18 +218,21 @@ def _rounding(problem: FrictionProblem, state: VectorState) -> float:
     return float(4.0 * ROUNDOFF * (size @ slope))
 
 
-def _disagreement(problem: FrictionProblem, state: VectorState, height: Fraction) -> float:
-    """Relative 2-norm of the forces minus those of `shear`, directed along the total; 0 at rest."""
-    if height == 0:
+def _disagreement(forces: Array, contact: Contact, Q: Array) -> float:
+    """Relative 2-norm of the forces minus those of `shear`, directed along Q; 0 if Q is 0."""
+    if (size := float(np.hypot(*Q))) == 0.0:
         return 0.0
-    other, _ = problem.from_rest(height)
-    total = float(np.hypot(*state.total))
-    difference = state.increments - other[:, None] * (state.total / total)
-    return float(np.linalg.norm(difference / total) / np.linalg.norm(other / total))
+    other = shear(contact, force=size).forces / size
+    difference = forces / size - other[:, None] * (Q / size)
+    return float(np.linalg.norm(difference) / np.linalg.norm(other))
 
 
 def _certificate(
-    contact: Contact, problem: FrictionProblem, state: VectorState, bounds: VectorBounds
+    contact: Contact,
+    problem: FrictionProblem,
+    state: VectorState,
+    bounds: VectorBounds,
+    force_error: float,
 ) -> ShearCertificate:
     def in_scene(errors: Array, values: Array, unit: float) -> Array:
         size = np.where(np.isfinite(values).all(axis=-1), np.hypot(*values.T), 0.0)
@@ -246,7 +254,7 @@ def _certificate(
         force_errors=frozen(strays + in_scene(bounds.increments, state.increments, unit)),
         slip_errors=frozen(unknown + in_scene(bounds.slips, state.slips, travel)),
         stick_radius_errors=frozen(np.where(open_, 0.0, np.inf)),
-        force_error=0.0,
+        force_error=force_error,
         displacement_error=displacement_error * travel,
     )
 

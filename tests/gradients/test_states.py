@@ -29,7 +29,7 @@ from levels_reference import (
     of_setup,
 )
 from multiprecision import exact, quotient, travel_of
-from scenes import NAMED, OPERATORS, hexagonal, paper, scattered
+from scenes import MATERIAL, NAMED, OPERATORS, hexagonal, paper, scattered
 
 import convexrough as cr
 from convexrough.friction.curve import MemoryCurve
@@ -372,6 +372,54 @@ def test_gross_sliding_from_one_side() -> None:
     first = np.arange(len(top)) == np.argmax(contact.scene.offsets)
     ratio = (2 - 0.3) / (2 * 0.7) * FRICTION
     np.testing.assert_allclose(moved.heights, ratio * (top + first), rtol=1e-14)
+    weights = np.eye(len(top))[0]  # derivatives of forces are finite
+    borne, close = (cr.shear(contact, force=it).gradient(forces=weights)
+                    for it in (force, force * (1 - 1e-12)))  # fmt: skip
+    for name in ("force", "load", "friction"):
+        (value, error), (beside, off) = known(borne, name), known(close, name)
+        assert abs(value - beside) <= error + off + 1e-6 * abs(value)
+        assert error < 1e-10 * abs(value)
+    state = cr.shear(contact, force=force)
+    slid = np.flatnonzero(state.slips)[:2]  # both rates are infinite, but their difference is not
+    unsure = state.gradient(slips=np.eye(len(top))[slid[0]] - np.eye(len(top))[slid[1]])
+    assert np.isnan(unsure.force)
+    assert unsure.force_error == np.inf
+
+
+def test_weights_that_are_added_are_not_rounded() -> None:
+    weight = 0.1 + 2.0**-56
+    alone = cr.Scene(1.0, cr.Asperities([[0.0, 0.0]], 0.02), MATERIAL)
+    gradient = cr.press(alone, load=1e-7).gradient(load=1.0, loads=[weight])
+    slope, error = known(gradient, "load")
+    assert abs(Fraction(float(slope)) - 1 - Fraction(weight)) <= Fraction(float(error))
+
+
+def test_slips_of_an_asperity_that_may_be_open() -> None:
+    """Its slip, and the derivative of this, may be 0 or not: bounds hold for both."""
+    side = np.linspace(-0.01, 0.01, 45)
+    points = np.stack(np.meshgrid(side, side), -1).reshape(-1, 2)
+    points += np.random.default_rng(0).uniform(-1e-4, 1e-4, points.shape)
+    array = cr.Asperities(points, 1e-4)
+
+    def contact_of(heights: Any) -> cr.Contact:
+        scene = with_friction(cr.Scene(1.0, array.with_tips(1e-4, heights), MATERIAL))
+        return cr.press(scene, approach=5e-5, influence="scattered")
+
+    contact = contact_of(0.0)
+    k, heights = int(np.argmin(np.where(contact.loads == 0, contact.gaps, 9.0))), np.zeros(2025)
+    for _ in range(4):
+        heights[k] += contact.gaps[k]
+        contact = contact_of(heights)
+    assert contact.status[k] == "undecided"
+    touching = contact_of(heights + 1e-18 * (np.arange(2025) == k))
+    assert touching.status[k] == "contact"
+    weights = (np.arange(2025) == k) * 1.0
+    unsure, sure = (cr.shear(each, force=0.15 * contact.load).gradient(slips=weights)
+                    for each in (contact, touching))  # fmt: skip
+    for true in (0.0, sure.value):
+        assert abs(unsure.value - true) <= unsure.value_error * 1.001
+    for true in (0.0, sure.heights[k]):
+        assert abs(unsure.heights[k] - true) <= unsure.height_errors[k] * 1.001
 
 
 def test_many_asperities_by_every_operator() -> None:

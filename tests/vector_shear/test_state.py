@@ -14,6 +14,7 @@ from friction_scenes import (
     in_doubt,
     lengths,
     pressed,
+    shaded,
     with_friction,
 )
 from hypothesis import given, settings
@@ -111,6 +112,19 @@ def test_gross_sliding() -> None:
     assert_allclose(finite.displacement[0], scalar.displacement, rtol=1e-13)
     assert_allclose(finite.slips[:, 0], scalar.slips, atol=1e-13 * scalar.displacement)
     assert finite.residual < 1e-13
+    for off in (-8, 8):
+        rounded = shear_vector(contact, force=state.force * (1 + off * 2.0**-53))
+        assert rounded.force.tolist() == state.force.tolist()
+        assert (rounded.status[contact.loads > 0] == "sliding").all()
+
+
+def test_where_order_fails_it_disagrees_with_what_shear_returns() -> None:
+    contact = cr.press(shaded(), load=2.96)
+    force = 0.4 * contact.load  # 0.8 f P
+    state, other = shear_vector(contact, force=force), cr.shear(contact, force=force)
+    assert other.order == "fails"
+    apart = np.linalg.norm(state.forces - np.outer(other.forces, [1, 0]))
+    assert_allclose(state.disagreement, apart / np.linalg.norm(other.forces), rtol=1e-12)
 
 
 @pytest.mark.sample(3)
