@@ -162,7 +162,8 @@ def load_path(
         results are not proved. With None, the states come from the memory curve; if order fails and
         the normal solution of the contact is proved, from 16, 32 or 64 general steps per segment
     solver    : method for general steps, if there are any: "newton", or "conic" for a second-order
-        cone program. If order is proved, one step per segment gives the path of the memory curve
+        cone program. If order is proved, one step per segment gives the states of the memory curve;
+        losses need more steps
 
     Raises InputError for an empty path, negative loads, shear forces that exceed f P, a scene
     without friction, or a `start` of another scene; SolverError if a normal problem or a general
