@@ -10,6 +10,7 @@ has another shape, InputError is raised.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -133,32 +134,18 @@ def cell_areas(points: Array) -> Array:
 
     points : (n, 2) [length]
 
-    Each Delaunay triangle adds (edge)^2 cot(opposite angle) / 8 to both ends of each of its edges.
-
     >>> cr.fields.cell_areas(np.array([[0, 0], [1, 0], [0, 1], [-1, 0], [0, -1.0]]))
     array([ 1., nan, nan, nan, nan])
     """
-    from scipy.spatial import Delaunay, QhullError  # takes 0.1 s to import
+    from scipy.spatial import ConvexHull, QhullError, Voronoi  # takes 0.1 s to import
 
-    unknown: Array = np.full(len(points), np.nan)
-    if len(points) < 4:
-        return unknown
-    try:
-        mesh = Delaunay(points)
-    except QhullError:  # all points are on one line
-        return unknown
-    areas: Array = np.zeros(len(points))
-    for turn in range(3):
-        apex, left, right = np.roll(mesh.simplices, turn, axis=1).T
-        u, v = points[left] - points[apex], points[right] - points[apex]
-        edge = points[right] - points[left]
-        squared = np.sum(edge**2, axis=1)
-        cross = np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
-        flat = cross < 1e-9 * squared  # three points in line, within rounding
-        share = squared * np.sum(u * v, axis=1) / np.where(flat, np.nan, cross) / 8.0
-        np.add.at(areas, left, share)
-        np.add.at(areas, right, share)
-    areas[mesh.convex_hull] = np.nan
+    areas: Array = np.full(len(points), np.nan)
+    with suppress(QhullError, ValueError):  # at most three points, or all on one line
+        cells = Voronoi(points)
+        for i, cell in enumerate(cells.point_region):
+            corners = cells.regions[cell]
+            if -1 not in corners:  # -1 is the corner at infinity
+                areas[i] = ConvexHull(cells.vertices[corners]).volume
     return areas
 
 
@@ -212,10 +199,7 @@ def _sum_everywhere(
 def _places(points: ArrayLike) -> tuple[Array, tuple[int, ...]]:
     """The points as an array (m, 2), and the shape (...) of a result."""
     expected = "finite numbers of shape (..., 2): x and y of each point"
-    try:
-        places = np.asarray(points, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError("points", found=repr(points)[:60], expected=expected) from error
+    places = checks.numbers("points", points, expected)
     if places.ndim == 0 or places.shape[-1] != 2:
         raise InputError("points", found=f"shape {places.shape}", expected=expected)
     if not np.isfinite(places).all():
