@@ -123,9 +123,20 @@ def cautions(normal: Mapping[str, Any], scene: Scene, approach: float) -> Iterat
             "the axis of the sphere, at x = 0 and y = 0, is at the edge of the asperities or "
             "outside: shift their positions if these are measured from another point"
         )
-    cut_off = normal["loaded"] >= FEW and normal["array_extent"] is not None
-    if cut_off and normal["array_extent"] < CUT_OFF:
-        yield at_the_rim(normal["array_extent"])
+    extent = normal["array_extent"]
+    cut_off = normal["loaded"] >= FEW and extent is not None
+    if cut_off and extent == 0:
+        yield (
+            "contact reaches the ends of the array along the axis of the cylinder: loads rise "
+            "towards the ends, and the approach depends on the length of the array; judge a long "
+            "cylinder by the middle of a long array"
+        )
+    elif cut_off and extent < CUT_OFF:
+        yield (
+            f"contact reaches the rim of the array, which is at {extent:.3g} of the contact radius "
+            "of the smooth sphere: the loads depend on the size of the array; check the unit of "
+            "the sphere's radius, or use a larger array"
+        )
     elif cut_off and normal["rim_touching"] > CUT_RIM:
         yield (
             f"{normal['rim_touching']:.0%} of the asperities at the rim of the array touch; "
@@ -148,7 +159,7 @@ def cautions(normal: Mapping[str, Any], scene: Scene, approach: float) -> Iterat
             "not represent the pressure of the disc at these summits"
         )
     if normal["beyond_hardness"]:
-        named = f" {units.pressure}".rstrip()
+        named = f" {units.name('pressure')}".rstrip()
         yield (
             f"mean pressure up to {normal['mean_pressure']:.4g}{named} exceeds the hardness "
             f"{normal['hardness']:.4g}{named} on {normal['beyond_hardness']} of "
@@ -200,21 +211,6 @@ def ends(scene: Scene, touching: NDArray[np.bool_]) -> bool:
     place = scene.asperities.positions[:, flat].ravel()
     reach = np.abs(place - (place.min() + place.max()) / 2)
     return bool(reach[touching].max(initial=0.0) > NEAR_END * reach.max() > 0)
-
-
-def at_the_rim(extent: float) -> str:
-    """A warning for an `array_extent` below `CUT_OFF`."""
-    if extent == 0:
-        return (
-            "contact reaches the ends of the array along the axis of the cylinder: loads rise "
-            "towards the ends, and the approach depends on the length of the array; judge a long "
-            "cylinder by the middle of a long array"
-        )
-    return (
-        f"contact reaches the rim of the array, which is at {extent:.3g} of the contact radius of "
-        "the smooth sphere: the loads depend on the size of the array; check the unit of the "
-        "sphere's radius, or use a larger array"
-    )
 
 
 def array_extent(scene: Scene, load: float) -> float | None:

@@ -241,10 +241,10 @@ def fretting_figures(worn: Fretting) -> Figures:
         return no_contact("fretting")
     scale = Scale(worn.contact)
     figure, maps = panels(DOUBLE, 6.2, 2, 2, sharex=True, sharey=True)
-    pressure, f = scale.units.pressure, scale.limit / worn.contact.load
+    pressure, f = scale.units.name("pressure"), scale.limit / worn.contact.load
     most = _largest(worn.largest_tractions) if pressure else f * scale.peak
     traction = style.measure(most, pressure, f"(f{scale.pressure.symbol})")
-    energy = style.measure(_largest(worn.losses), scale.units.work, "W_m")
+    energy = style.measure(_largest(worn.losses), scale.units.name("work"), "W_m")
     draw_slip(maps[0], worn, scale)
     for axes, values, unit, name, symbol in (
         (maps[1], worn.losses, energy, "energy lost per cycle", "W_i"),

@@ -45,7 +45,7 @@ def steady_figures(found: Cycle) -> Figures:
     name_statuses(figure, found.status)
     said = "the loss does not settle"
     if not np.isnan(found.loss):
-        said = f"a steady cycle loses {style.quantity(found.loss, found.scene.units.work)}"
+        said = f"a steady cycle loses {style.quantity(found.loss, found.scene.units.name('work'))}"
     style.title(chart, said)
     return Figures({"steady": figure})
 
@@ -71,7 +71,7 @@ def draw_losses(axes: Axes, found: PhaseLosses) -> None:
     sizes = np.unique(found.factors)[-MOST_FACTORS:]
     cubes = np.abs(found.factors) ** 3
     most = float(np.fmax.reduce(found.losses / cubes, initial=0.0)) or 1.0
-    unit = style.measure(most, found.scene.units.work, "W_m")
+    unit = style.measure(most, found.scene.units.name("work"), "W_m")
     for size, shade, pattern in zip(sizes, style.shades_of(len(sizes)), PATTERNS, strict=False):
         those = np.flatnonzero(found.factors == size)
         those = those[np.argsort(found.phases[those])]

@@ -188,7 +188,7 @@ def literal(text: str) -> str:
 
 def _metric(unit: str) -> tuple[str, int] | None:
     """The SI unit of which a unit is 10^power, and the power; None for other units."""
-    if (known := parsed(unit) if unit.strip() else None) is None:
+    if (known := parsed(unit)) is None:
         return None
     power = round(math.log10(known.size))
     name = SYMBOLS.get((known.length, known.force))
@@ -223,7 +223,7 @@ class Scale:
             self.peak = load / (np.pi * self.typical**2) if load else 0.0
         symbols = ("a_H", "p_0") if self.sphere else ("r_c", "\\bar p")
         self.length = measure(self.typical, self.units.length, symbols[0])
-        pressure, most = self.units.pressure, peak_pressures(contact).max()
+        pressure, most = self.units.name("pressure"), peak_pressures(contact).max()
         self.pressure = measure(float(most) if pressure else self.peak, pressure, symbols[1])
 
     @property
@@ -263,7 +263,8 @@ class Scale:
 
     def energy(self, largest: float) -> Measure:
         """The measure of energies up to the largest."""
-        return measure(largest if self.units.work else self.work, self.units.work, "W_0")
+        unit = self.units.name("work")
+        return measure(largest if unit else self.work, unit, "W_0")
 
     def footnote(self) -> str:
         """A line that says what f P and X0 are."""

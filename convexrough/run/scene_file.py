@@ -172,7 +172,7 @@ def read_study(path: Path) -> tuple[Study, str]:
 
 def _one_unit(path: Path, own: str, named: str) -> None:
     """Raise InputError unless `own`, the unit of a map's summits, is the scene's unit `named`."""
-    here, there = (parsed(unit) if unit else None for unit in (own, named))
+    here, there = parsed(own), parsed(named)
     if own != named and not (here and there and here.into(there) == 1):
         found = f"summits of a map {f'in {own}' if own else 'without a unit'}"
         expected = f'{named}, as in {path}: surface.to_unit("{named}")'

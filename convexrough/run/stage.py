@@ -315,8 +315,4 @@ class Steps(Result):
 
 def unit_of(name: str, units: UnitNames) -> str:
     """The unit of the number with this name; "" if it has none or the scene names no units."""
-    length, force = units.length, units.force
-    known = {"length": length, "force": force, "area": length and f"{length}²"}
-    if length and force:
-        known |= {"work": f"{force} {length}", "stiffness": f"{force}/{length}"}
-    return known.get(KIND.get(name, ""), "")
+    return units.name(KIND.get(name, ""))

@@ -120,7 +120,7 @@ class UnitsTable(FileTable):
     @property
     def names(self) -> UnitNames:
         """The units of length and force. By default, force is pressure times length squared."""
-        pressure, length = (parsed(name) if name else None for name in (self.pressure, self.length))
+        pressure, length = parsed(self.pressure), parsed(self.length)
         made = force_of(pressure, length) if pressure and length else ""
         return UnitNames(self.length.strip(), self.force.strip() or made)
 

@@ -170,22 +170,17 @@ class UnitNames(NamedTuple):
 
     def unit(self, kind: str) -> Unit | None:
         """The scene's unit of "length", "force", "area" or "pressure"; None if it is not named."""
-        length, force = (parsed(name) if name else None for name in self)
-        if kind == "area" and length:
-            return (length**2)._replace(name=f"{self.length}²")
-        if kind == "pressure" and length and force:
-            return (force * length**-2)._replace(name=self.pressure)
-        return {"length": length, "force": force}.get(kind)
+        return parsed(self.name(kind))
 
-    @property
-    def work(self) -> str:
-        """The name of the unit of work; "" unless both units are named."""
-        return f"{self.force} {self.length}" if self.length and self.force else ""
-
-    @property
-    def pressure(self) -> str:
-        """The name of the unit of pressure; "" unless both units are named."""
-        return f"{self.force}/{self.length}²" if self.length and self.force else ""
+    def name(self, kind: str) -> str:
+        """The name of the unit of "length", "force", "area", "pressure", "work" or "stiffness"; ""
+        for other kinds, and unless the scene names the units of which it consists."""
+        length, force = self
+        known = {"length": length, "force": force, "area": length and f"{length}²"}
+        if length and force:
+            known["pressure"] = f"{force}/{length}²"
+            known |= {"work": f"{force} {length}", "stiffness": f"{force}/{length}"}
+        return known.get(kind, "")
 
 
 NAMELESS = UnitNames()
