@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sized
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from convexrough.arrays import Array, even, evenly
 from convexrough.errors import InputError
@@ -134,14 +134,20 @@ def same_index(**given: Any) -> None:
             raise InputError(name, found="another index", expected=expected)
 
 
+def is_permuted(index: NDArray[Any]) -> bool:
+    """True if an index has the numbers 0, 1, ... or 1, 2, ... in another order."""
+    if index.dtype.kind not in "iuf" or len(index) < 2:
+        return False
+    ordered = np.sort(index)
+    counts = ordered[0] in (0, 1) and (np.diff(ordered) == 1).all()
+    return bool(counts and (ordered != index).any())
+
+
 def in_order(what: str, values: Any) -> None:
-    """Raise InputError for a pandas object with the index 0, 1, ..., n - 1 in another order."""
-    if hasattr(values, "iloc"):
-        index = np.asarray(values.index)
-        counts = index.dtype.kind in "iu" and (np.sort(index) == np.arange(len(index))).all()
-        if counts and (np.diff(index) < 0).any():
-            expected = "increasing order: use .sort_index(), or .to_numpy() if rows are in order"
-            raise InputError(what, found="an index in another order", expected=expected)
+    """Raise InputError for a pandas object with an index that `is_permuted`."""
+    if hasattr(values, "iloc") and is_permuted(np.asarray(values.index)):
+        expected = "increasing order: use .sort_index(), or .to_numpy() if rows are in order"
+        raise InputError(what, found="an index in another order", expected=expected)
 
 
 def some(what: str, values: Sized) -> None:

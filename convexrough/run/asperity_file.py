@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.errors import InputError, blamed_on
 from convexrough.progress import LOGGER, NOTE
@@ -55,7 +55,7 @@ def read_summits(
             raise InputError(f"column {name}", found=f"{said}, and a scene without units",
                              expected=expected, where=str(path))  # fmt: skip
     for name, cells in table.others.items():
-        if is_index(name) and is_permuted(cells):
+        if is_index(name) and checks.is_permuted(cells):
             found = f"{cells[0]:g}, {cells[1]:g}, ..."
             expected = "the rows in increasing order, or no such column"
             raise InputError(f"column {name}", found=found, expected=expected, where=str(path))
@@ -91,12 +91,3 @@ def _summary_in_last_row(columns: list[Array]) -> str:
         if all(abs(each[-1] - of(each[:-1])) <= ROUNDED * np.ptp(each[:-1]) for each in columns):
             return what
     return ""
-
-
-def is_permuted(cells: NDArray[Any]) -> bool:
-    """True if the cells are the numbers 0, 1, ... or 1, 2, ... in another order."""
-    if cells.dtype.kind != "f" or len(cells) < 2:
-        return False
-    ordered = np.sort(cells)
-    counts = ordered[0] in (0, 1) and (np.diff(ordered) == 1).all()
-    return bool(counts and (ordered != cells).any())
