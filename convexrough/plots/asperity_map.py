@@ -19,6 +19,7 @@ from convexrough.contact import Contact
 from convexrough.plots import style
 from convexrough.plots.notebook import Figure, panels
 from convexrough.plots.style import COLOURS, DASHED, DOUBLE, FAINT, SINGLE, SMOOTH, Scale
+from convexrough.scene.neighbours import nearest_distances
 
 #: DENSE or more discs are stored as pixels in vector files. CROWDED or more discs are replaced by a
 #: mosaic, an image in which each pixel has the colour of the nearest asperity, or a mean.
@@ -219,12 +220,8 @@ def status_handles(statuses: ArrayLike, looks: Looks = LOOKS) -> list[Line2D]:
 
 def even_radii(points: Array, chosen: NDArray[np.bool_]) -> Array:
     """(n,) radii of discs: one radius, about 0.42 of the spacing, at chosen points, 0 at others."""
-    from scipy.spatial import cKDTree  # 0.1 s to import: only when asked
-
-    apart = size = float(np.ptp(points, axis=0).max()) or 1.0
-    if len(points) > 1:
-        sample = points[:: max(1, len(points) // 1000)]
-        apart = float(np.median(np.asarray(cKDTree(points).query(sample, k=2)[0])[:, 1]))
+    size = float(np.ptp(points, axis=0).max()) or 1.0
+    apart = float(np.median(nearest_distances(points))) if len(points) > 1 else size
     return np.where(chosen, float(np.clip(0.42 * apart, 0.006 * size, 0.05 * size)), 0.0)
 
 

@@ -29,21 +29,15 @@ POINTS = 400  # number of points of a loop
 DASHES: list[Any] = ["-", (0, (5, 1.5)), (0, (3, 1, 1, 1)), (0, (1, 1)), (0, (7, 2, 2, 2)), "-"]
 
 
-def cycle_figures(
-    cycles: Sequence[Cycle],
-    *,
-    loops: Sequence[Loop] | None = None,
-    asperities: Sequence[int] | None = None,
-) -> Figures:
+def cycle_figures(cycles: Sequence[Cycle], *, loops: Sequence[Loop] | None = None) -> Figures:
     """The figures of steady cycles of one contact.
 
-    loops      : the loop of each cycle; None to compute them
-    asperities : indices of asperities whose loops are drawn; default: one at each distance from the
-        centre, at most 6
+    loops : the loop of each cycle; None to compute them
 
     "hysteresis" : loops of the cycles and of the smooth sphere. If there are more than 4 cycles,
         only those whose ranges are nearest to 1, 3/4, 1/2 and 1/4 of the widest are drawn. Also
-        loops of the asperities in the cycle of the widest range
+        loops, in the cycle of the widest range, of one asperity at each of at most 6 distances from
+        the centre
     "loss" : energy against amplitude, for cycles of several ranges
 
     >>> forces = 0.5 * contact.load * np.array([0.1, 0.3, 0.5])
@@ -65,10 +59,9 @@ def cycle_figures(
         nearest = np.argmin(np.abs(amplitudes[:, None] - parts), axis=0)
         shown = [order[i] for i in np.unique(nearest)]
     r = scale.distances
-    if asperities is None:
-        known = np.arange(len(r)) if loops is None else loops[order[0]].asperities
-        rings = one_of_each_ring(r[known], contact.loads[known], MOST_ASPERITIES)
-        asperities = known[rings].tolist()
+    known = np.arange(len(r)) if loops is None else loops[order[0]].asperities
+    rings = one_of_each_ring(r[known], contact.loads[known], MOST_ASPERITIES)
+    asperities = known[rings].tolist()
     named = [(f"{scale.length.of(r[i]):.3g}", i) for i in asperities]
     some = [cycles[i] for i in shown]
     theirs = steady_loops(some, POINTS, asperities) if loops is None else [loops[i] for i in shown]

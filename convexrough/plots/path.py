@@ -28,10 +28,8 @@ MOST_MAPS, MOST_CURVES, MOST_NUMBERS, MOST_DOTS = 8, 4, 12, 60
 MOST_POINTS, AFFORDABLE, MOST_BETWEEN, MOST_SEGMENTS = 500, 16_000, 40, 24
 
 
-def path_figures(path: LoadPath, *, fine: LoadPath | None = None) -> Figures:
+def path_figures(path: LoadPath) -> Figures:
     """The figures of a load path, or of a history, which has constant load.
-
-    fine : the path with the additional points of `between`; None to compute them
 
     "history" : at constant load: shear force Q against displacement X, with numbered steps if there
         are few; and energy lost since the beginning against the step
@@ -46,7 +44,7 @@ def path_figures(path: LoadPath, *, fine: LoadPath | None = None) -> Figures:
     """
     if path.load_constant and not path.contact.loads.any():
         return no_contact("history")
-    scale, fine = Scale(path.contact), fine or between(path)
+    scale, fine = Scale(path.contact), _finer(path)
     height, columns = (3.0, 2) if path.load_constant else (3.2, 3)
     figure, (*plane, loop, cost) = panels(DOUBLE, height, 1, columns, gridspec_kw={"wspace": 0.06})
     for axes in plane:
@@ -63,7 +61,7 @@ def path_figures(path: LoadPath, *, fine: LoadPath | None = None) -> Figures:
 def draw_loop_or_plane(axes: Axes, path: LoadPath) -> None:
     """Draw the loop of a path; at varying load, its points in the plane of P and Q / f."""
     if path.load_constant:
-        _draw_loop(axes, path, Scale(path.contact), between(path))
+        _draw_loop(axes, path, Scale(path.contact), _finer(path))
     else:
         _draw_path(axes, path)
 
@@ -157,15 +155,11 @@ def _maps(path: LoadPath, scale: Scale) -> Figure:
     return figure
 
 
-def between(path: LoadPath) -> LoadPath:
+def _finer(path: LoadPath) -> LoadPath:
     """The path with points added between the given ones.
 
     The path is unchanged if these points cost too much, if order fails, if nothing touches, or if a
     path of varying load starts from a pressed contact. The function may solve normal problems.
-
-    >>> past = cr.history(contact, forces=0.5 * contact.load * np.array([0.6, -0.2, 0.3]))
-    >>> len(cr.plots.between(past).forces)
-    120
     """
     m, touching = len(path.forces), max(1, int(np.count_nonzero(path.contact.loads)))
     each = min(MOST_POINTS, AFFORDABLE // touching) // max(1, m)

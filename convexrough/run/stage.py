@@ -304,8 +304,7 @@ class Steps(Result):
         })  # fmt: skip
 
     def figures(self) -> Mapping[str, Figure]:
-        (found,) = self.found
-        return plots.path_figures(found, fine=plots.between(found))
+        return plots.path_figures(self.found[0])
 
     def summary(self) -> Summary:
         """Each number of the stage as a list with an entry for each step."""
