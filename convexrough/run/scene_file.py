@@ -8,7 +8,6 @@ import re
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from io import BytesIO, TextIOWrapper
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -191,11 +190,10 @@ def digest(path: Path) -> str:
 
 def read_text(path: Path) -> str:
     """The text of a UTF-8 file, with or without a byte-order mark. Raises FileError."""
-    with reading(path), path.open("rb") as file:
-        contents = file.read(MOST_BYTES + 1)
-        if len(contents) > MOST_BYTES:
+    with reading(path):
+        if path.stat().st_size > MOST_BYTES:
             raise FileError(f"{path}: more than {MOST_BYTES / 2**20:g} MiB")
-        return TextIOWrapper(BytesIO(contents), encoding="utf-8-sig").read()
+        return path.read_text(encoding="utf-8-sig")
 
 
 def tables_of(path: Path, text: str) -> dict[str, Any]:
@@ -214,8 +212,7 @@ def tables_of(path: Path, text: str) -> dict[str, Any]:
 
 def has_sweep(path: Path) -> bool:
     """True if a scene file has a table [sweep]."""
-    text = read_text(path)
-    return bool(re.search(r"^\s*\[\s*sweep\b", text, re.M)) and "sweep" in tables_of(path, text)
+    return "sweep" in tables_of(path, read_text(path))
 
 
 def regular(pattern: str, spacing: float, tip_radius: Any, within: float) -> Asperities:

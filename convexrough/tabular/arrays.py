@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.errors import ConvexroughError, ExtraError, FileError, needed
+from convexrough.errors import ConvexroughError, ExtraError, FileError, file_errors, needed
 
 Columns = dict[str, list[Any]]
 
@@ -31,7 +31,8 @@ ARRAYS = (".npy", ".npz", ".mat", ".parquet")
 def reading(path: Path) -> Iterator[None]:
     """A context manager: turn errors of the body, in which a file is read, into FileErrors."""
     try:
-        yield
+        with file_errors(path, "be read"):
+            yield
     except ExtraError as error:
         raise FileError(f"{path}: {error}") from error
     except ConvexroughError:
@@ -41,8 +42,6 @@ def reading(path: Path) -> Iterator[None]:
         raise FileError(f"{path}: {found}") from error
     except UnicodeError as error:
         raise FileError(f"{path}: not text: {error}") from error
-    except OSError as error:
-        raise FileError(f"{path}: cannot be read: {error.strerror or error}") from error
     except (ValueError, EOFError, zlib.error) as error:  # also those of `foreign`
         raise FileError(f"{path}: not an {path.suffix} file: {error}") from error
 
