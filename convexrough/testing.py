@@ -28,6 +28,8 @@ from convexrough.scene.scene import Scene
 from convexrough.verdict import verify
 from convexrough.verdict.report import describe_claim, reason
 
+__tracebackhide__ = True  # pytest shows no frames of this module
+
 P = ParamSpec("P")
 T = TypeVar("T")
 
@@ -52,7 +54,6 @@ def assert_certified(
     >>> cr.testing.assert_certified(scene, contact.loads, approach=5e-5, within=1e-9).scope
     'global'
     """
-    __tracebackhide__ = True
     verdict = _asked(verify, scene, loads, approach=approach, load=load, within=within, floor=floor)
     if len(verdict.undecided) == len(scene):
         _check_proof(verdict.certificate)
@@ -88,7 +89,6 @@ def assert_shear_certified(
     >>> proof.all_proved
     True
     """
-    __tracebackhide__ = True
     verdict = _asked(verify_shear, contact, forces, force=force, within=within, sliding=sliding)
     _check(verdict)
     return verdict.certificate
@@ -118,7 +118,6 @@ def assert_agree(
     >>> other = cr.press(scene, approach=5e-5, solver="conic")
     >>> cr.testing.assert_agree(contact, other, within=1e-9)
     """
-    __tracebackhide__ = True
     within = tolerance("within", within)
     one = _asked(_answer, "first", first, scene, approach, load)
     other = _asked(_answer, "second", second, scene, approach, load)
@@ -145,7 +144,6 @@ def assert_agree(
 
 def _asked(question: Callable[P, T], *arguments: P.args, **options: P.kwargs) -> T:
     """question(...); the traceback of an InputError shows no frames of the package."""
-    __tracebackhide__ = True
     try:
         return question(*arguments, **options)
     except InputError as error:
@@ -195,17 +193,13 @@ def _one_problem(
         for part in ("contact_points", "offsets", "relative_radii"):
             if not np.array_equal(getattr(given, part), getattr(wanted, part)):
                 raise InputError(name, found=f"other {part}", expected=f"the scene of `{start}`")
-        if given.material.contact_modulus != wanted.material.contact_modulus:
-            found = f"the contact modulus {given.material.contact_modulus!r}"
-            expected = f"{wanted.material.contact_modulus!r}, as in `{start}`"
-            raise InputError(name, found=found, expected=expected)
-        if said != control:
-            expected = f"{control}, as in `{start}`"
-            raise InputError(name, found=f"prescribed {said}", expected=expected)
+        moduli = [f"the contact modulus {it.material.contact_modulus!r}" for it in (given, wanted)]
+        for found, expected in (moduli, (f"prescribed {said}", f"prescribed {control}")):
+            if found != expected:
+                raise InputError(name, found=found, expected=f"{expected}, as in `{start}`")
 
 
 def _check_proof(certificate: Certificate, whose: str = "") -> None:
-    __tracebackhide__ = True
     if certificate.scope == "none":
         why = certificate.meaning.removeprefix("nothing is proved")
         raise AssertionError(
@@ -215,7 +209,6 @@ def _check_proof(certificate: Certificate, whose: str = "") -> None:
 
 
 def _check(claim: Claim) -> None:
-    __tracebackhide__ = True
     if not claim.holds:
         hints = (f"hint: {each}" for each in claim.hints())
         lines = [reason(claim), *describe_claim(claim), *hints]
