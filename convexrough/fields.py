@@ -50,9 +50,10 @@ def pressure(contact: Contact, points: ArrayLike) -> Array:
     >>> print(cr.fields.pressure(contact, line).round(4))
     [0.0214 0.     0.0128 0.0128 0.     0.0181]
     """
-    peaks = peak_pressures(contact)
+    peaks, profile = peak_pressures(contact), hertz.pressure
     touching, centres, radii = _discs(contact)
-    return superpose(points, centres, radii, peaks[touching])
+    own = peaks[touching]
+    return _sum_over_discs(points, centres, radii, lambda r, i: profile(r, radii[i], own[i]))
 
 
 def normal_displacement(contact: Contact, points: ArrayLike) -> Array:
@@ -149,19 +150,6 @@ def cell_areas(points: Array) -> Array:
     return areas
 
 
-def superpose(points: ArrayLike, centres: Array, radii: Array, peaks: Array) -> Array:
-    """(...) sum_i peak_i sqrt(1 - |r - r_i|^2 / radius_i^2) over the discs that contain r.
-
-    points : (..., 2) [length];  centres : (n, 2) [length];  radii : (n,) [length], positive
-    peaks  : (n,) in the unit of the result
-
-    >>> cr.fields.superpose([[0.6, 0.0], [2.0, 0.0]], np.zeros((1, 2)), np.ones(1), np.ones(1))
-    array([0.8, 0. ])
-    """
-    profile = hertz.pressure
-    return _sum_over_discs(points, centres, radii, lambda r, i: profile(r, radii[i], peaks[i]))
-
-
 def _sum_over_discs(
     points: ArrayLike, centres: Array, radii: Array, profile: Callable[[Array, Indices], Array]
 ) -> Array:
@@ -169,16 +157,11 @@ def _sum_over_discs(
     from scipy.spatial import cKDTree  # takes 0.1 s to import
 
     flat, shape = _places(points)
+    near = cKDTree(flat).query_ball_point(centres, radii)
+    disc = np.repeat(np.arange(len(centres)), [len(inside) for inside in near])
+    point = np.array([i for inside in near for i in inside], dtype=np.intp)
     total = np.zeros(len(flat))
-    tree = cKDTree(flat)
-    octaves = np.frexp(radii)[1]
-    for octave in np.unique(octaves):
-        group = np.flatnonzero(octaves == octave)
-        near = tree.sparse_distance_matrix(
-            cKDTree(centres[group]), float(radii[group].max()), output_type="ndarray"
-        )
-        values = profile(near["v"], group[near["j"]])
-        total += np.bincount(near["i"], weights=values, minlength=len(flat))
+    np.add.at(total, point, profile(np.hypot(*(flat[point] - centres[disc]).T), disc))
     return total.reshape(shape)
 
 
