@@ -193,21 +193,15 @@ class Summits(Table, Asperities, Plottable):
         return Summits(**{name: values[keep] for name, values in columns.items()}, origin=origin)
 
 
-class Tips(NamedTuple):
-    """Paraboloids fitted around maxima: arrays have an entry for each of the n that are whole."""
-
-    #: for each maximum, True if its paraboloid has a top, within the fitted pixels
-    whole: NDArray[np.bool_]
-    offsets: Array  # (n, 2) [length] x and y of the top, from the pixel of the maximum
-    heights: Array  # (n,) [length] of the tops
-    curvatures: Array  # (n, 2) [1/length] principal curvatures, the larger first
-    deviations: Array  # (n,) [length] rms distance of the pixels from the sphere of the tip
-
-
-def fit_tips(heights: Array, pixels: Indices, pixel: tuple[float, float], across: int) -> Tips:
+def fit_tips(
+    heights: Array, pixels: Indices, pixel: tuple[float, float], across: int
+) -> tuple[NDArray[np.bool_], dict[str, Array]]:
     """Least-squares paraboloids over `across` by `across` pixels about each maximum.
 
     pixels : (n, 2) row and column of the maxima, at least across // 2 from the edges of the map
+
+    Returns a mask (n,), True for paraboloids that have a top within the fitted pixels; and for
+    these, the columns of `Summits` that follow from them.
     """
     reach = across // 2
     down, right = (each.ravel() for each in np.mgrid[-reach : reach + 1, -reach : reach + 1])
@@ -232,6 +226,12 @@ def fit_tips(heights: Array, pixels: Indices, pixel: tuple[float, float], across
     summits = z0 + (gu * u0 + gv * v0) / 2
     x, y = (right - u0[:, None]) * dx, (down - v0[:, None]) * dy
     sphere = summits[:, None] - np.sqrt(product)[:, None] * (x * x + y * y) / 2
-    deviations = np.sqrt(np.mean((around[whole] - sphere) ** 2, axis=1))
-    offsets, curvatures = np.stack((u0 * dx, v0 * dy), 1), np.stack((larger, smaller), 1)
-    return Tips(whole, offsets, summits, curvatures, deviations)
+    middle = (pixels[whole] - (np.array(heights.shape) - 1) / 2)[:, ::-1]
+    return whole, {
+        "positions": middle * pixel + np.stack((u0 * dx, v0 * dy), 1),
+        "tip_radii": 1 / np.sqrt(larger * smaller),
+        "heights": summits,
+        "largest_curvatures": larger,
+        "smallest_curvatures": smaller,
+        "deviations": np.sqrt(np.mean((around[whole] - sphere) ** 2, axis=1)),
+    }

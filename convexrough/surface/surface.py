@@ -300,17 +300,17 @@ class Surface(Record, Plottable):
         """
         prune = checks.between("prune", prune, 0.0, 1.0)
         checks.whole("fit", fit, 3)
-        rows, columns = shape = self.heights.shape[0], self.heights.shape[1]
+        rows, width = shape = self.heights.shape[0], self.heights.shape[1]
         if fit % 2 == 0:
             raise InputError("fit", found=fit, expected="an odd number of pixels, at least 3")
         if min(shape) < fit:
             expected = f"at least {fit} by {fit}, as fit is {fit}"
-            raise InputError("map", found=f"{columns} by {rows} pixels", expected=expected)
+            raise InputError("map", found=f"{width} by {rows} pixels", expected=expected)
         maxima, reach = self.hills.pixels, fit // 2
         prominent = self.hills.prominences >= prune * self.max_height
-        inside = ((maxima >= reach) & (maxima < (rows - reach, columns - reach))).all(axis=1)
+        inside = ((maxima >= reach) & (maxima < (rows - reach, width - reach))).all(axis=1)
         tried = maxima[prominent & inside]
-        tips = fit_tips(self.heights, tried, self.pixel, fit)
+        whole, columns = fit_tips(self.heights, tried, self.pixel, fit)
         same = ("source", "pixel", "unit", "removed", "filled", "checksum", "max_height", "moments")
         origin = Origin(
             **{name: getattr(self, name) for name in same},
@@ -321,28 +321,17 @@ class Surface(Record, Plottable):
             maxima=len(maxima),
             pruned=int(np.count_nonzero(~prominent)),
             at_edge=int(np.count_nonzero(prominent & ~inside)),
-            without_top=int(np.count_nonzero(~tips.whole)),
+            without_top=int(np.count_nonzero(~whole)),
         )
-        if not tips.whole.any():
+        if not whole.any():
             none = (
                 f"none of {origin.maxima:,} maxima: {origin.pruned:,} pruned, {origin.at_edge:,} "
                 f"at the edge, {origin.without_top:,} without a fitted maximum"
             )
             expected = "; ".join(("at least one", *self.warnings[:1]))
             raise InputError("summits", found=none, expected=expected)
-        chosen, (k1, k2) = tried[tips.whole], tips.curvatures.T
-        middle = (chosen - np.array([rows - 1, columns - 1]) / 2)[:, ::-1]
-        return Summits(
-            positions=middle * self.pixel + tips.offsets,
-            tip_radii=1 / np.sqrt(k1 * k2),
-            heights=tips.heights,
-            prominences=self.hills.prominences[prominent & inside][tips.whole],
-            largest_curvatures=k1,
-            smallest_curvatures=k2,
-            deviations=tips.deviations,
-            pixels=chosen,
-            origin=origin,
-        )
+        prominences = self.hills.prominences[prominent & inside][whole]
+        return Summits(prominences=prominences, pixels=tried[whole], origin=origin, **columns)
 
 
 def checked_pixel(pixel: ArrayLike) -> tuple[float, float]:

@@ -365,16 +365,17 @@ def test_a_paraboloid_is_found_exactly(across: int, scale: float) -> None:
     u = np.cos(angle) * (x - x0) + np.sin(angle) * (y - y0)
     v = np.cos(angle) * (y - y0) - np.sin(angle) * (x - x0)
     heights = 2.0 * scale - k1 * u**2 / 2 - k2 * v**2 / 2
-    tips = fit_tips(heights, np.array([[4, 5]]), (dx, dy), across)
-    assert tips.whole.all()
-    assert_allclose(tips.offsets[0], [x0, y0], rtol=1e-11)
-    assert_allclose(tips.heights, 2.0 * scale, rtol=1e-13)
-    assert_allclose(tips.curvatures[0], [k1, k2], rtol=1e-10)
+    whole, tips = fit_tips(heights, np.array([[4, 5]]), (dx, dy), across)
+    assert whole.all()
+    assert_allclose(tips["positions"][0], [x0, y0], rtol=1e-11)
+    assert_allclose(tips["heights"], 2.0 * scale, rtol=1e-13)
+    curvatures = tips["largest_curvatures"], tips["smallest_curvatures"]
+    assert_allclose(np.ravel(curvatures), [k1, k2], rtol=1e-10)
     reach = across // 2
     near = np.s_[4 - reach : 5 + reach, 5 - reach : 6 + reach]
     sphere = 2.0 * scale - np.sqrt(k1 * k2) * ((x - x0) ** 2 + (y - y0) ** 2) / 2
     deviation = np.sqrt(np.mean((heights - sphere)[near] ** 2))
-    assert_allclose(tips.deviations, deviation, rtol=1e-10)
+    assert_allclose(tips["deviations"], deviation, rtol=1e-10)
 
 
 @pytest.mark.parametrize("ratio", [1.001, 2.0, 40.0, 1e3])
