@@ -12,6 +12,5 @@ from .shakedown import shakedown_figures as shakedown_figures
 from .shear import shear_figures as shear_figures
 from .steady import phase_figures as phase_figures
 from .steady import steady_figures as steady_figures
-from .surface import provability_figure as provability_figure
 from .surface import surface_figures as surface_figures
 from .verdict import verdict_figures as verdict_figures

@@ -55,7 +55,7 @@ def surface_figures(
     figures = Figures({"map": _map(surface, summits, contact)})
     figures["histograms"] = _histograms(surface, maxima, summits)
     if curve is not None:
-        figures["provability"] = provability_figure(curve, summits.origin.prune, surface.unit)
+        figures["provability"] = _provability_figure(curve, summits.origin.prune, surface.unit)
     return figures
 
 
@@ -94,20 +94,10 @@ def draw_provability(axes: Axes, curve: Provability) -> None:
     style.label(axes, "pruning  [% of $Sz$]", "number")
 
 
-def provability_figure(curve: Provability, chosen: float, unit: str = "") -> Figure:
-    """The figure of contacts, crowding and model error against pruning.
-
-    Prunings below the smallest at which the assumptions of the asperity model are met are shaded.
-
-    chosen : the pruning that a dotted line marks;  unit : of the map's lengths, "" if unknown
-
-    >>> summits = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1).summits(prune=0.0)
-    >>> def press(some):
-    ...     return cr.press(cr.Scene(1e4, some, cr.Material(1.0, 0.3)), load=10.0)
-    >>> curve = cr.surface.provability(summits, press, levels=[0.0, 0.1, 0.3])
-    >>> print(cr.plots.provability_figure(curve, chosen=0.1).axes[0].get_title(loc="left"))
-    assumptions met from 0 %   ($Sz$ = 2.85)
-    """
+def _provability_figure(curve: Provability, chosen: float, unit: str) -> Figure:
+    """The figure of contacts, crowding and model error against pruning, with a dotted line at the
+    chosen one. Prunings below the smallest at which the assumptions of the asperity model are met
+    are shaded."""
     figure, (upper, middle, lower) = panels(SINGLE, 5.0, 3, 1)
     draw_provability(upper, curve)
     upper.legend(fontsize=TICK - 1, frameon=False, loc="lower left", handlelength=1.6)
