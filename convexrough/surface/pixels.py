@@ -6,6 +6,7 @@ its place in ascending order of heights. For the method see docs/theory/surfaces
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -32,6 +33,10 @@ OUTLYING = 6.0
 #: four nearest of them a spike causes a quarter of its own.
 ALONE = 3.0
 AROUND = np.arange(25).reshape(5, 5) != 12
+
+#: A warning is given if at least this fraction of the rows equal the row before. At 1 the map is a
+#: profile.
+MANY_COPIED = 0.25
 
 #: Approximate number of pixels in the sample in which `repeated` counts heights.
 SAMPLE = 2**17
@@ -137,6 +142,26 @@ def spikes(heights: Array) -> Indices:
         alike += apart < away[tuple(found.T)] / 2  # this also counts the pixel itself
     alone[tuple(found[alike <= 2].T)] = True
     return np.argwhere(alone)
+
+
+def flaws(heights: Array) -> Iterator[str]:
+    """Warnings about heights that look wrong. Holes are nan."""
+    known = heights[~np.isnan(heights)]
+    if many := clipped(known):
+        yield (
+            f"the highest {many:,} pixels have exactly the same height: the map seems to be cut "
+            "off at the top, where asperities touch, and their tip radii are wrong"
+        )
+    if many := repeated(known):
+        yield (
+            f"{many:,} pixels had exactly the same height in the data, many more than have any "
+            "other height: if these are missing values, make them nan"
+        )
+    if MANY_COPIED <= (part := copied(heights)) < 1:
+        yield (
+            f"{part:.0%} of the rows or columns equal the one before: the map seems to be enlarged "
+            "by repeating pixels, and tip radii are wrong; use the map as measured"
+        )
 
 
 def clipped(heights: Array) -> int:

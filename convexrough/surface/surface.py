@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -33,10 +33,6 @@ MOST, FITTED, ROUND = 0.5, 256, 0.1
 #: have 1e-3 to 1e-4.
 FLAT, STEEP = 3e-4, 1.0
 
-#: A warning is given if at least this fraction of the rows equal the row before. At 1 the map is a
-#: profile.
-MANY_COPIED = 0.25
-
 #: A warning is given if heights have a step larger than this part of their rms second difference.
 #: At this value a tenth of the maxima of a self-affine surface are lost.
 COARSE = 0.5
@@ -54,15 +50,12 @@ class Surface(Record, Plottable):
     unit    : unit of all lengths, "" if unknown
     removed : forms subtracted from the heights, in this order
     filled_pixels : (ny, nx) True for pixels that were holes; None if there were none
-    clipped : number of pixels at the largest height if the map seems to be cut off there, else 0
-    repeated : number of pixels with the most frequent height if they are surprisingly many and this
-        is not the largest height, else 0
-    copied  : fraction of rows that equal the row before, or the same of columns if that is larger
     step    : [length] distance of the values that the heights take, as of grey levels; else 0
+    flaws   : warnings about heights that look wrong
     source  : the file, or a description
     comments : comments of the file that were not used
 
-    By default `clipped`, `repeated`, `copied` and `step` are determined from `heights`.
+    By default `step` and `flaws` are determined from `heights`.
 
     Raises InputError for maps that are constant or have holes, for pixels with one side more than
     ten times the other, and for a unit that is neither "" nor a unit of length such as "mm" or
@@ -80,10 +73,8 @@ class Surface(Record, Plottable):
     filled_pixels: NDArray[np.bool_] | None
     source: str
     comments: tuple[str, ...]
-    clipped: int
-    repeated: int
-    copied: float
     step: float
+    flaws: tuple[str, ...] = field(repr=False)  # `warnings` has them, too
 
     def __init__(
         self,
@@ -94,10 +85,8 @@ class Surface(Record, Plottable):
         filled_pixels: NDArray[np.bool_] | None = None,
         source: str = "",
         comments: tuple[str, ...] = (),
-        clipped: int | None = None,
-        repeated: int | None = None,
-        copied: float | None = None,
         step: float | None = None,
+        flaws: tuple[str, ...] | None = None,
     ) -> None:
         grid, size = _checked(heights), checked_pixel(pixel)
         if not isinstance(unit, str):
@@ -117,10 +106,8 @@ class Surface(Record, Plottable):
             removed=removed,
             source=source,
             comments=comments,
-            clipped=pixels.clipped(known) if clipped is None else clipped,
-            repeated=pixels.repeated(known) if repeated is None else repeated,
-            copied=pixels.copied(self._measured) if copied is None else copied,
             step=pixels.step(known) if step is None else step,
+            flaws=tuple(pixels.flaws(self._measured)) if flaws is None else flaws,
         )
 
     @property
@@ -201,21 +188,7 @@ class Surface(Record, Plottable):
     def _wrong_pixels(self) -> Iterator[str]:
         if (part := self.filled / self.heights.size) > 0.5:
             yield f"{part:.0%} of the pixels were holes: most of this map is not measured"
-        if self.clipped:
-            yield (
-                f"the highest {self.clipped:,} pixels have exactly the same height: the map seems "
-                "to be cut off at the top, where asperities touch, and their tip radii are wrong"
-            )
-        if self.repeated:
-            yield (
-                f"{self.repeated:,} pixels had exactly the same height in the data, many more than "
-                "have any other height: if these are missing values, make them nan"
-            )
-        if MANY_COPIED <= self.copied < 1:
-            yield (
-                f"{self.copied:.0%} of the rows or columns equal the one before: the map seems to "
-                "be enlarged by repeating pixels, and tip radii are wrong; use the map as measured"
-            )
+        yield from self.flaws
         if self.step > COARSE * np.sqrt(self.moments.m4) * self.pixel[0] * self.pixel[1]:
             step = f"{self.step:.4g} {self.unit}".rstrip()
             yield (

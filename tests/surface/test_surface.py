@@ -11,7 +11,7 @@ from scipy.ndimage import gaussian_filter
 
 import convexrough as cr
 from convexrough.sphere import ellipse
-from convexrough.surface.pixels import filled, hills, spikes
+from convexrough.surface.pixels import clipped, filled, hills, repeated, spikes
 from convexrough.surface.summits import fit_tips
 
 RNG = np.random.default_rng(5)
@@ -169,8 +169,8 @@ def test_spikes_and_drop_outs_are_named() -> None:
     assert f"{(missing == missing.min()).sum():,} pixels had exactly the same height" in told[0]
     few = np.round(made, 5)
     few.flat[::500] = 0.0
-    assert cr.surface.Surface(few, 1.0).repeated == 33
-    assert cr.surface.Surface(np.round(made, 1), 1.0).repeated == 0  # few levels, as of images
+    assert repeated(few) == 33
+    assert repeated(np.round(made, 1)) == 0  # few levels, as of images
     for levels, warned in ((40, True), (100, True), (250, False)):  # as of 8 bits, or fewer
         step = np.ptp(made) / levels
         few = np.where(made < np.quantile(made, 0.01), np.nan, np.rint(made / step) * step)
@@ -211,7 +211,7 @@ def test_a_map_that_is_cut_off_at_the_top_is_named() -> None:
         assert any("exactly the same height" in each for each in surface.warnings)
     levels = np.round(heights * 20)  # as of a byte for each pixel
     for whole in (heights, levels):
-        assert cr.surface.Surface(whole, 1.0).clipped == 0
+        assert clipped(whole) == 0
 
 
 def test_a_form_is_fitted_to_measured_pixels() -> None:
