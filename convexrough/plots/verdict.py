@@ -64,19 +64,18 @@ def draw_claim(axes: Axes, claim: Claim) -> None:
 
 def draw_times(axes: Axes, comparison: Comparison) -> None:
     """Draw a dot at the time of each entry; one without a result has its outcome as text."""
-    columns = {name: values for name, (_, values) in comparison._variables().items()}
-    names, outcomes, seconds = (columns[name] for name in ("solver", "outcome", "seconds"))
-    for place, (outcome, time) in enumerate(zip(outcomes, seconds, strict=True)):
-        if outcome == "answered":
-            axes.plot(time, place, "o", color=ROUGH, clip_on=False)
+    names = [entry.solver for entry in comparison.entries]
+    for place, entry in enumerate(comparison.entries):
+        if entry.contact is not None:
+            axes.plot(entry.contact.seconds, place, "o", color=ROUGH, clip_on=False)
         else:
-            axes.text(0.02, place, outcome, transform=axes.get_yaxis_transform(),
+            axes.text(0.02, place, entry.outcome, transform=axes.get_yaxis_transform(),
                       va="center", fontsize=TICK, color=UNSURE)  # fmt: skip
     axes.set(xscale="log", ylim=(len(names) - 0.5, -0.5))
     axes.set_yticks(range(len(names)), names, fontsize=TICK)
-    times = seconds[(outcomes == "answered") & (seconds > 0)]
-    if len(times):  # whole decades: the axis is short
-        powers = np.floor(np.log10(times.min())), np.ceil(np.log10(1.01 * times.max()))
+    times = [contact.seconds for contact in comparison.contacts if contact.seconds > 0]
+    if times:  # whole decades: the axis is short
+        powers = np.floor(np.log10(min(times))), np.ceil(np.log10(1.01 * max(times)))
         axes.set_xlim(*(10.0**power for power in powers))
         axes.xaxis.set_major_locator(LogLocator(numticks=4))
         axes.xaxis.set_minor_formatter(NullFormatter())
