@@ -19,7 +19,7 @@ from convexrough.plots import style
 from convexrough.plots.asperity_map import SLIDING, STICK, draw_values
 from convexrough.plots.cycle import loops_figure, ring_colour, smooth_loop
 from convexrough.plots.notebook import Figure, Figures, panels
-from convexrough.plots.press import abscissae, map_and_profile, pressure_figure, towards_rim
+from convexrough.plots.press import TOWARDS_RIM, abscissae, map_and_profile, pressure_figure
 from convexrough.plots.shear import draw_state, legend_handles
 from convexrough.plots.style import DASHED, DOTTED, DOUBLE, ROUGH, SMOOTH, TICK, UNSURE, Scale
 from convexrough.run.stage import Columns
@@ -95,7 +95,7 @@ def _traction_figure(found: PaperStates, scale: Scale) -> Figure:
     style.title(chart, f"$Q/(fP)$ = {SHARE:g}")
 
     a, c = contact.contact_radii[centre], state.stick_radii[centre]
-    x = np.unique(np.concatenate((a * towards_rim(), c * towards_rim())))
+    x = np.unique(np.concatenate((a * TOWARDS_RIM, c * TOWARDS_RIM)))
     line = contact.scene.contact_points[centre] + np.column_stack((x, np.zeros_like(x)))
     profile.axvspan(-c / a, c / a, fc=STICK, alpha=0.5, lw=0, label="stick disc")
     fp = unit.of(f * fields.pressure(contact, line))
@@ -139,8 +139,8 @@ def _section_figure(found: PaperStates, scale: Scale) -> Figure:
     across = scale.length.of(x)
     axes.fill_between(across, fp, fc=(ROUGH, 0.15), ec=ROUGH, lw=0.8, label="asperities: $fp$")
     axes.fill_between(across, q, fc=(ROUGH, 0.65), ec=ROUGH, lw=0.8, label="asperities: $q$")
-    s = scale.typical * towards_rim()
-    s = np.union1d(s, towards_rim() * sphere.stick_radius(state.force))
+    s = scale.typical * TOWARDS_RIM
+    s = np.union1d(s, TOWARDS_RIM * sphere.stick_radius(state.force))
     smooth_fp, smooth_q = f * sphere.pressure(np.abs(s)), sphere.traction(np.abs(s), state.force)
     for values, ls, name in ((smooth_fp, DASHED, "$fp$"), (smooth_q, DOTTED, "$q$")):
         axes.plot(scale.length.of(s), unit.of(values), ls=ls, lw=1.4, color=SMOOTH,

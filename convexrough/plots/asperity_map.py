@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Ellipse
 from numpy.typing import ArrayLike, NDArray
 
-from convexrough.arrays import Array
+from convexrough.arrays import Array, Number
 from convexrough.contact import Contact
 from convexrough.plots import style
 from convexrough.plots.notebook import Figure, panels
@@ -199,7 +199,7 @@ def draw_outline(
 
 
 def status_layers(
-    status: NDArray[np.str_], radii: Array, stick: Array | None = None, looks: Looks = LOOKS
+    status: NDArray[np.str_], radii: Number, stick: Array | None = None, looks: Looks = LOOKS
 ) -> list[Layer]:
     """A layer of discs for each status, and one for the stick discs of "partial" asperities."""
     layers = [
@@ -218,11 +218,11 @@ def status_handles(statuses: ArrayLike, looks: Looks = LOOKS) -> list[Line2D]:
     return [style.disc_handle(*look) for status, look in looks.items() if status in occur]
 
 
-def even_radii(points: Array, chosen: NDArray[np.bool_]) -> Array:
-    """(n,) radii of discs: one radius, about 0.42 of the spacing, at chosen points, 0 at others."""
+def even_radius(points: Array) -> float:
+    """The radius of equal discs at points: about 0.42 of their spacing."""
     size = float(np.ptp(points, axis=0).max()) or 1.0
     apart = float(np.median(nearest_distances(points))) if len(points) > 1 else size
-    return np.where(chosen, float(np.clip(0.42 * apart, 0.006 * size, 0.05 * size)), 0.0)
+    return float(np.clip(0.42 * apart, 0.006 * size, 0.05 * size))
 
 
 def _draw_mosaic(axes: Axes, points: Array, shades: Array, low: Array, high: Array) -> None:

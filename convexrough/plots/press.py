@@ -18,6 +18,9 @@ from convexrough.plots.notebook import Figure, Figures, no_contact, panels
 from convexrough.plots.style import DOUBLE, ROUGH, SINGLE, SMOOTH, UNSURE, Scale
 from convexrough.sphere import hertz
 
+#: (81,) abscissae from -1 to 1, dense at both ends so that a semicircle looks smooth.
+TOWARDS_RIM = np.sin(np.linspace(-np.pi / 2, np.pi / 2, 81))
+
 
 def press_figures(contact: Contact) -> Figures:
     """The figures of a pressed contact; keys are file names without suffix.
@@ -83,11 +86,6 @@ def draw_pressure(axes: Axes, contact: Contact, scale: Scale | None = None) -> S
     return draw_values(axes, scale, values, name, radii=radii, most=most)
 
 
-def towards_rim() -> Array:
-    """(81,) abscissae from -1 to 1, dense at both ends so that a semicircle looks smooth."""
-    return np.sin(np.linspace(-np.pi / 2, np.pi / 2, 81))
-
-
 def abscissae(centres: Array, radii: Array, edge: float) -> Array:
     """Abscissae from -edge to edge, dense at the rims of discs on y = 0, where pressure is steep.
 
@@ -96,7 +94,7 @@ def abscissae(centres: Array, radii: Array, edge: float) -> Array:
     x, y = centres.T
     crossed = np.abs(y) < radii
     half_chord = np.sqrt(radii[crossed] ** 2 - y[crossed] ** 2)
-    places = x[crossed, None] + np.outer(half_chord, towards_rim())
+    places = x[crossed, None] + np.outer(half_chord, TOWARDS_RIM)
     return np.unique(np.append(places, [-edge, edge]))
 
 
@@ -108,7 +106,7 @@ def _draw_section(axes: Axes, scale: Scale, sides: tuple[float, float]) -> None:
     axes.fill_between(scale.length.of(x), rough, facecolor=(ROUGH, 0.2), edgecolor=ROUGH,
                       lw=float(np.clip(3000 / len(x), 0.4, 0.9)),
                       label="asperities, $y=0$")  # fmt: skip
-    _draw_smooth(axes, scale, scale.axes[:1], towards_rim())
+    _draw_smooth(axes, scale, scale.axes[:1], TOWARDS_RIM)
     axes.set_xlim(*sides)
 
 
@@ -118,7 +116,7 @@ def _draw_peaks(axes: Axes, scale: Scale) -> None:
     r = scale.length.of(scale.distances[touching])
     peaks = scale.pressure.of(fields.peak_pressures(scale.contact)[touching])
     _draw_points(axes, r, peaks, float(peaks.max()), "peaks of all")
-    _draw_smooth(axes, scale, sorted(set(scale.axes)), np.abs(towards_rim()[40:]))
+    _draw_smooth(axes, scale, sorted(set(scale.axes)), np.abs(TOWARDS_RIM[40:]))
     reach = max([scale.typical, *scale.axes])
     axes.set_xlim(0.0, 1.05 * max(float(r.max()), scale.length.of(reach)))
     style.label(axes, scale.length.label("r"), scale.pressure.label("p"))
@@ -182,7 +180,7 @@ def _draw_smooth_share(axes: Axes, scale: Scale) -> None:
     whole = np.isfinite(areas) & (scale.contact.loads[sample] > 0)
     if whole.sum() < 7:
         return
-    s = towards_rim()[40:]
+    s = TOWARDS_RIM[40:]
     share = hertz.pressure(s, 1.0, 150.0 / np.pi) * np.median(areas[whole]) / scale.typical**2
     axes.plot(scale.length.of(scale.typical) * s, share, "--", lw=1.1, color=SMOOTH,
               label="smooth $p(r)$ × cell area")  # fmt: skip

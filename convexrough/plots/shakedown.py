@@ -10,7 +10,7 @@ from matplotlib.colors import Normalize
 from convexrough.arrays import Array
 from convexrough.melan.shakedown import Shakedown
 from convexrough.plots import style
-from convexrough.plots.asperity_map import Layer, draw_map, even_radii
+from convexrough.plots.asperity_map import Layer, draw_map, even_radius
 from convexrough.plots.notebook import Figure, Figures, panels
 from convexrough.plots.style import COLOURS, DASHED, FAINT, SINGLE, SMOOTH, UNSURE
 
@@ -49,7 +49,7 @@ def draw_factors(axes: Axes, found: Shakedown) -> None:
     low, high = values[known].min(initial=np.inf), values[known].max(initial=-np.inf)
     spread = Normalize(min(low, high), high if high > low else low * 1.01 + 1e-300)
     colours = ScalarMappable(spread, COLOURS)
-    radii = even_radii(points, known)
+    radii = np.where(known, even_radius(points), 0.0)
     first = known & (found.factors <= found.factor * (1 + 1e-6)) & (not vector)
     layers = [
         Layer("first", np.where(first, 1.25 * radii, 0.0), UNSURE, None),

@@ -11,7 +11,7 @@ from matplotlib.ticker import LogLocator, NullFormatter, NullLocator
 from convexrough.arrays import Array
 from convexrough.contact import Contact
 from convexrough.plots import style
-from convexrough.plots.asperity_map import Layer, draw_discs, draw_map, draw_outline, even_radii
+from convexrough.plots.asperity_map import Layer, draw_discs, draw_map, draw_outline, even_radius
 from convexrough.plots.notebook import Figure, Figures, panels
 from convexrough.plots.style import DASHED, FAINT, ROUGH, SINGLE, SMOOTH, TICK, UNSURE, Scale
 from convexrough.surface.provability import OVERLAP, TOO_FAR, Provability, crowded
@@ -75,8 +75,8 @@ def draw_surface(axes: Axes, surface: Surface) -> tuple[AxesImage, style.Measure
 
 def draw_summit_map(axes: Axes, summits: Summits) -> None:
     """Draw a disc at each summit."""
-    every = np.ones(len(summits), dtype=bool)
-    layer = Layer("summits", even_radii(summits.positions, every), SUMMIT)
+    radii = np.full(len(summits), even_radius(summits.positions))
+    layer = Layer("summits", radii, SUMMIT)
     length = style.measure(float(np.ptp(summits.positions)) / 2, summits.unit)
     draw_map(axes, summits.positions, length, [layer])
 

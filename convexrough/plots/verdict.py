@@ -45,8 +45,8 @@ def draw_claim(axes: Axes, claim: Claim) -> None:
     """Draw the map of one claim; marks of wrong claims differ also without colours."""
     status, points = claim.status, claim.of.asperities.positions
     length = style.measure(float(np.ptp(points)), claim.of.units.length)
-    size = maps.even_radii(points, np.ones(len(points), dtype=bool))
-    maps.draw_map(axes, points, length, maps.status_layers(status, size, looks=SHADES))
+    layers = maps.status_layers(status, maps.even_radius(points), looks=SHADES)
+    maps.draw_map(axes, points, length, layers)
     handles = maps.status_handles(status, SHADES)
     marked = {**claim.wrong, "undecided": claim.undecided}
     for mark, (what, those) in zip("oX^", marked.items(), strict=True):
