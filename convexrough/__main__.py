@@ -5,8 +5,10 @@
 
 from __future__ import annotations
 
+import _thread
 import os
 import sys
+from threading import Timer
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -29,20 +31,16 @@ def main() -> int:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # Python only has to exit
         return status
     except KeyboardInterrupt:
-        _say_interrupted()
+        os.write(2, b"convexrough: interrupted\n")
         return INTERRUPTED
 
 
 def _unraisable(unraised: Any) -> None:
-    """Exit on an interrupt that cannot be raised, such as one in a callback of a library."""
+    """Send an interrupt again that Python ignores, as one that arrives while it frees an object."""
     if issubclass(unraised.exc_type, KeyboardInterrupt):
-        _say_interrupted()
-        os._exit(INTERRUPTED)
-    sys.__unraisablehook__(unraised)
-
-
-def _say_interrupted() -> None:
-    os.write(2, b"convexrough: interrupted\n")
+        Timer(0.01, _thread.interrupt_main).start()
+    else:
+        sys.__unraisablehook__(unraised)
 
 
 if __name__ == "__main__":

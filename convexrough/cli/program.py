@@ -5,14 +5,13 @@ Each command imports slow modules only when it runs.
 
 from __future__ import annotations
 
-import _thread
 import errno
 import os
 import signal
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from threading import Timer, current_thread, main_thread
+from threading import current_thread, main_thread
 from types import FrameType
 
 import click
@@ -89,11 +88,7 @@ def _status(arguments: Sequence[str] | None) -> int:
 
 @contextmanager
 def _interrupts() -> Iterator[list[int]]:
-    """A list of the Ctrl-C signals during the body; each also raises KeyboardInterrupt.
-
-    Python ignores an error that is raised while it frees an object. A signal that arrives then is
-    sent again.
-    """
+    """A list of the Ctrl-C signals during the body; each also raises KeyboardInterrupt."""
     seen: list[int] = []
     handler = signal.getsignal(signal.SIGINT)
     if handler is not signal.default_int_handler or current_thread() is not main_thread():
@@ -104,19 +99,11 @@ def _interrupts() -> Iterator[list[int]]:
         seen.append(number)
         raise KeyboardInterrupt
 
-    def ignored(error: sys.UnraisableHookArgs) -> None:
-        if error.exc_type is KeyboardInterrupt:
-            Timer(0.01, _thread.interrupt_main).start()
-        else:
-            hook(error)
-
-    hook, sys.unraisablehook = sys.unraisablehook, ignored
     signal.signal(signal.SIGINT, interrupt)
     try:
         yield seen
     finally:
         signal.signal(signal.SIGINT, handler)
-        sys.unraisablehook = hook
 
 
 def _unheard(error: OSError) -> int:

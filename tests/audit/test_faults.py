@@ -116,12 +116,13 @@ def test_an_interrupt_while_an_object_is_freed(tmp_path: Path) -> None:
     """Python ignores errors of `__del__`, so this interrupt would be lost."""
     code = (
         "import signal, sys, convexrough.cli.program as program\n"
+        "from convexrough.__main__ import main\n"
         "class Freed:\n"
         "    def __del__(self): signal.raise_signal(signal.SIGINT)\n"
         "def status(arguments):\n"
         "    import time; Freed(); [time.sleep(0.01) for _ in range(1000)]\n"
         "program._status = status\n"
-        "signal.signal(signal.SIGINT, signal.default_int_handler); sys.exit(program.main([]))"
+        "signal.signal(signal.SIGINT, signal.default_int_handler); sys.exit(main())"
     )
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert (ran.returncode, ran.stderr) == (130, "convexrough: interrupted\n")
