@@ -80,7 +80,7 @@ def numbers(what: str, values: ArrayLike, expected: str = "numbers") -> Array:
             raise TypeError("no real numbers")
         return evenly(lambda some: np.array(some, dtype=np.float64), given)
     except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(what, found=_short(values), expected=expected) from error
+        raise InputError(what, found=shown(values), expected=expected) from error
 
 
 def array(
@@ -193,16 +193,18 @@ def instance(what: str, value: object, kind: type) -> None:
         raise InputError(what, found=found, expected=article + name)
 
 
-def _short(value: object) -> str:
+def shown(value: object) -> str:
     """A value for one line of an error message: its text, shortened, or its type."""
     text = repr(value)
-    return f"type {type(value).__name__}" if "\n" in text else text[:60]
+    if "\n" in text:
+        return f"type {type(value).__name__}"
+    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def sequence(what: str, values: object, expected: str) -> None:
     """Raise InputError for text, and for values that are not iterable."""
     if isinstance(values, str) or not isinstance(values, Iterable):
-        raise InputError(what, found=_short(values), expected=expected)
+        raise InputError(what, found=shown(values), expected=expected)
 
 
 def exactly_one(first: str, a: object, second: str, b: object) -> None:
@@ -248,4 +250,4 @@ def _number(what: str, value: float | None, expected: str) -> float:
     try:
         return float(value)
     except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(what, found=_short(value), expected=expected) from error
+        raise InputError(what, found=shown(value), expected=expected) from error

@@ -157,11 +157,8 @@ def phrased(error: ErrorDetails) -> str:
         return f"{where}: missing"
     if not place and error["type"] == "told":
         return f"{where} {error['msg']}"
-    found = "" if error["type"] == "told" else f"found {shown(error['input'])}, expected "
-    return f"{where}: {found}{error['msg']}"
-
-
-def shown(value: object) -> str:
-    """A value as text for a message, shortened if it is long."""
-    text = str(value).lower() if isinstance(value, bool) else repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
+    if error["type"] == "told":
+        return f"{where}: {error['msg']}"
+    found = error["input"]
+    said = str(found).lower() if isinstance(found, bool) else checks.shown(found)  # as in TOML
+    return f"{where}: found {said}, expected {error['msg']}"
