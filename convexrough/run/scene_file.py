@@ -27,7 +27,6 @@ from convexrough.tabular.arrays import reading
 from convexrough.tabular.roles import Reading, named_columns
 from convexrough.tabular.table import few
 from convexrough.tabular.toml_slips import explained
-from convexrough.tabular.units import parsed
 
 if TYPE_CHECKING:
     from convexrough.run.stage import Result, Stage
@@ -136,11 +135,14 @@ def read_scene(path: str | os.PathLike[str], *, asperities: Asperities | None = 
         raise InputError("path", found=repr(path)[:60], expected="the name of a scene file")
     path = Path(path)
     study, text = read_study(path)
-    if asperities is not None:
-        from convexrough.surface.summits import Summits  # only for maps
-
-        if isinstance(asperities, Summits):
-            _one_unit(path, asperities.origin.unit, study.units.names.length)
+    named, origin = study.units.names.length, getattr(asperities, "origin", None)  # of a map
+    if origin and bool(origin.unit) != bool(named):  # `Scene` compares units that are both named
+        found = f"summits of a map in {origin.unit}"
+        expected = f"a unit of length in {path} ([units] length), or a map without a unit"
+        if named:
+            found = "summits of a map without a unit"
+            expected = f'a map with a unit, as {path} is in {named}: unit="...", or --unit'
+        raise InputError("asperities", found=found, expected=expected)
     task = tasks_of(path, study, asperities=asperities)(None)
     layout, sources = study.asperities, [path]
     if layout.pattern == "file" and asperities is None:
@@ -167,19 +169,6 @@ def read_study(path: Path) -> tuple[Study, str]:
     if study is None:
         raise SceneFileError(str(path), few(mistakes, MOST_MISTAKES))
     return study, text
-
-
-def _one_unit(path: Path, own: str, named: str) -> None:
-    """Raise InputError unless `own`, the unit of a map's summits, is the scene's unit `named`."""
-    here, there = parsed(own), parsed(named)
-    if own != named and not (here and there and here.into(there) == 1):
-        found = f"summits of a map {f'in {own}' if own else 'without a unit'}"
-        expected = f'{named}, as in {path}: surface.to_unit("{named}")'
-        if not own:
-            expected = f'a map with a unit, as {path} is in {named}: unit="...", or --unit'
-        if not named:
-            expected = f"a unit of length in {path} ([units] length), or a map without a unit"
-        raise InputError("asperities", found=found, expected=expected)
 
 
 def digest(path: Path) -> str:

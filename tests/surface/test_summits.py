@@ -119,7 +119,7 @@ def test_a_scene_in_another_unit(find: Any) -> None:
     nameless = find("nameless.npy", "--pixel", "1", "--scene", "metres.toml")
     assert nameless.refuses("expected a map with a unit, as metres.toml is in m: unit=")
     summits = cr.surface.read("scan.npz").summits(0.05)
-    with pytest.raises(cr.InputError, match=r'in µm, expected m.*surface\.to_unit\("m"\)'):
+    with pytest.raises(cr.InputError, match=r'summits in µm, expected .* Surface.to_unit\("m"\)'):
         cr.read_scene("metres.toml", asperities=summits)
     write_scene("unnamed.toml", "", radius=0.01, modulus=1e12)
     unnamed = find("scan.npz", "--scene", "unnamed.toml")
