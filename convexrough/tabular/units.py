@@ -163,7 +163,7 @@ class UnitNames(NamedTuple):
             if not isinstance(name, str):
                 raise InputError(f"units, {kind}", found=repr(name), expected='a name, as "mm"')
             known_unit(f"units, {kind}", name, kind)
-        return cls(*names)
+        return cls(*(name.strip() for name in names))
 
     def __str__(self) -> str:
         return ", ".join(filter(None, self))
