@@ -25,6 +25,7 @@ from convexrough.contact import Contact
 from convexrough.errors import InputError, SolverError
 from convexrough.influence.convolution import SiteBox
 from convexrough.record import Along, Table
+from convexrough.surface.pixels import centres
 from convexrough.surface.surface import Surface
 
 #: Largest number of steps of conjugate gradients, and accepted error of gaps / largest overlap.
@@ -170,7 +171,7 @@ def press_whole(surface: Surface, contact: Contact) -> Whole:
         expected = "a larger map, a smaller approach or load, or no --whole"
         raise InputError("map", found="contact at the edge of the map", expected=expected)
     row, column = np.nonzero(touching)
-    x, y = _places(surface, 1)
+    x, y = centres(surface.heights.shape, surface.pixel)
     area = surface.pixel[0] * surface.pixel[1]
     tree = cKDTree(contact.scene.contact_points)
     _, nearest = tree.query(np.column_stack((x[column], y[row])))
@@ -187,16 +188,9 @@ def press_whole(surface: Surface, contact: Contact) -> Whole:
     )
 
 
-def _places(surface: Surface, every: int) -> tuple[Array, Array]:
-    """[length] x of every `every`-th column, and y of every `every`-th row."""
-    (rows, columns), (dx, dy) = surface.heights.shape, surface.pixel
-    x, y = (np.arange(columns) - (columns - 1) / 2) * dx, (np.arange(rows) - (rows - 1) / 2) * dy
-    return x[::every], y[::every]
-
-
 def _pressed(surface: Surface, contact: Contact, every: int) -> tuple[Array, float]:
     """The pressures on pixels `every` times as wide, and the total load [force]."""
-    x, y = _places(surface, every)
+    x, y = (each[::every] for each in centres(surface.heights.shape, surface.pixel))
     overlap = contact.approach + surface.heights[::every, ::every]
     for radius, axes in contact.scene.curved:
         for axis in np.arange(2)[axes]:

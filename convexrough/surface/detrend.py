@@ -10,6 +10,7 @@ import numpy as np
 
 from convexrough.arrays import Array
 from convexrough.errors import InputError
+from convexrough.surface.pixels import centres
 
 Trend = Literal["plane", "sphere", "paraboloid"]
 TRENDS: tuple[Trend, ...] = ("plane", "sphere", "paraboloid")
@@ -77,11 +78,9 @@ def fitted(heights: Array, pixel: tuple[float, float], kind: Trend) -> tuple[Rem
     the method. In the code, lengths are divided by about half the longer side of the map.
     """
     known = ~np.isnan(heights)
-    rows, columns = heights.shape
-    x = (np.arange(columns) - (columns - 1) / 2) * pixel[0]
-    y = ((np.arange(rows) - (rows - 1) / 2) * pixel[1])[:, None]
-    size = max(float(x[-1]), float(y[-1, 0]))
-    x, y = (np.broadcast_to(each / size, heights.shape)[known] for each in (x, y))
+    x, y = centres(heights.shape, pixel)
+    size = max(float(x[-1]), float(y[-1]))
+    x, y = (each[known] / size for each in np.meshgrid(x, y, copy=False))
     level = float(heights[known].mean()) if known.any() else 0.0
     wanted = (heights[known] - level) / size
     terms = [np.ones_like(wanted), x, y]

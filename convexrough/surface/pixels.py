@@ -42,6 +42,12 @@ MANY_COPIED = 0.25
 SAMPLE = 2**17
 
 
+def centres(shape: tuple[int, ...], pixel: tuple[float, float]) -> tuple[Array, Array]:
+    """[length] x of each column and y of each row of a map, measured from its middle."""
+    y, x = (np.arange(count, dtype=np.float64) - (count - 1) / 2 for count in shape)
+    return x * pixel[0], y * pixel[1]
+
+
 class Hills(NamedTuple):
     """The maxima of a map, the tallest first."""
 

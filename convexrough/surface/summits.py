@@ -16,7 +16,7 @@ from convexrough.record import Along, Record, Table
 from convexrough.scene.asperities import Asperities
 from convexrough.sphere import ellipse
 from convexrough.surface.detrend import Removed
-from convexrough.surface.pixels import Moments
+from convexrough.surface.pixels import Moments, centres
 
 #: A maximum is a ridge, without a top, if the product of the fitted principal curvatures is at most
 #: this part of their squared sum; on maps of coarse steps it may be 0, and positive by rounding.
@@ -226,9 +226,9 @@ def fit_tips(
     summits = z0 + (gu * u0 + gv * v0) / 2
     x, y = (right - u0[:, None]) * dx, (down - v0[:, None]) * dy
     sphere = summits[:, None] - np.sqrt(product)[:, None] * (x * x + y * y) / 2
-    middle = (pixels[whole] - (np.array(heights.shape) - 1) / 2)[:, ::-1]
+    (column_x, row_y), (row, column) = centres(heights.shape, pixel), pixels[whole].T
     return whole, {
-        "positions": middle * pixel + np.stack((u0 * dx, v0 * dy), 1),
+        "positions": np.stack((column_x[column] + u0 * dx, row_y[row] + v0 * dy), 1),
         "tip_radii": 1 / np.sqrt(larger * smaller),
         "heights": summits,
         "largest_curvatures": larger,
