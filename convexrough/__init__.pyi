@@ -1,12 +1,13 @@
 """The public names and their modules; `__init__.py` imports each name when it is first used."""
 
-from . import compare as compare
 from . import fields as fields
 from . import gallery as gallery
 from . import plots as plots
 from . import solvers as solvers
 from . import surface as surface
 from . import testing as testing
+from .comparison import Comparison as Comparison
+from .comparison import compare as compare
 from .contact import Contact as Contact
 from .contact import press as press
 from .errors import ConvexroughError as ConvexroughError

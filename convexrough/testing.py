@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from convexrough import checks
-from convexrough.compare import Answer, contradictions, joined
+from convexrough.comparison import Answer, contradictions, joined
 from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.friction.shear import ShearCertificate

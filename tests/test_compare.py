@@ -15,8 +15,8 @@ from scene_files import scene_text
 from scenes import NAMED, PAPER_APPROACH, paper, random_scenes
 
 import convexrough as cr
-from convexrough import compare as comparing
-from convexrough.compare import Answer, compare, contradictions, every_solver
+from convexrough import comparison as comparing
+from convexrough.comparison import Answer, compare, contradictions, every_solver
 from convexrough.normal.certificate import OPEN, TOUCHING
 from convexrough.normal.problem import NormalProblem
 from convexrough.solvers import BristleQP, ConicCVXPY, Newton

@@ -173,7 +173,7 @@ BAD = [
     (lambda: cr.Asperities(pd.DataFrame({"x": [0.0], "height": [1.0]}), 1.0), "columns x, height"),
     (lambda: cr.Asperities(TWO[["x", "y"]], 1.0, TWO["z"][::-1]), "heights: found another index"),
     (lambda: cr.certify(PAPER, pd.Series(np.ones(61))[::-1], load=1.0), "index in another order"),
-    (lambda: cr.compare.compare(PAPER), "approach, load: found neither"),
+    (lambda: cr.compare(PAPER), "approach, load: found neither"),
     (lambda: cr.testing.assert_agree(CONTACT, CONTACT.loads), "scene: found none"),
     (lambda: cr.testing.assert_agree(CONTACT, OTHER), "second: found 1, expected as many"),
     (lambda: cr.testing.assert_agree(CONTACT, CONTACT, within=5), "within: found 5, expected a fr"),

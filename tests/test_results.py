@@ -21,8 +21,7 @@ from matplotlib.figure import Figure
 from scenes import MATERIAL, PAPER_APPROACH, paper
 
 import convexrough as cr
-from convexrough import plots, solvers
-from convexrough.compare import compare
+from convexrough import compare, plots, solvers
 from convexrough.errors import ExtraError, SceneFileError
 from convexrough.plots.notebook import ShownAxes
 from convexrough.record import Record, singular
@@ -245,7 +244,7 @@ from convexrough import cli
 cli.main(["--help"])
 unused = {"pydantic", "matplotlib", "rich", "cvxpy", "scipy.spatial", "scipy.linalg"}
 assert not unused & {*sys.modules}
-cr.testing.assert_certified, cr.compare.compare
+cr.testing.assert_certified, cr.compare
 scene = cr.Scene(1.0, cr.Asperities([[0.0, 0.0]], 1.0), cr.Material(1.0, 0.3))
 repr(cr.press(scene, approach=1e-4))
 file = cr.read_scene(cr.__path__[0] + "/run/new_scene.toml")

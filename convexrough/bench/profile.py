@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array
-from convexrough.compare import compare, every_solver
+from convexrough.comparison import compare, every_solver
 from convexrough.gallery.cases import case, names
 from convexrough.plots.notebook import new_axes
 from convexrough.plots.style import SINGLE, TICK, label

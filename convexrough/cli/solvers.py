@@ -33,8 +33,8 @@ def compare(
     a solver does not accept the scene; else 0. A contradiction shows a mistake in the mathematics
     or the code of this package.
     """
-    from convexrough.compare import compare as compare_solvers
-    from convexrough.compare import solver_named
+    from convexrough.comparison import compare as compare_solvers
+    from convexrough.comparison import solver_named
     from convexrough.run import comparison as report
     from convexrough.run.results import write_rows
     from convexrough.run.scene_file import read_scene
@@ -136,7 +136,7 @@ def gallery(
     have a load. With --solver the exit status is 4 if a solver failed, else 3 if loads are wrong.
     """
     from convexrough import gallery as wing
-    from convexrough.compare import solver_named
+    from convexrough.comparison import solver_named
     from convexrough.gallery.export import exported
     from convexrough.tabular.columns import aligned
 

@@ -127,7 +127,7 @@ class Objective(Record):
         slopes = {name: getattr(gradient, name) for name in self.by}
         for name, each in slopes.items():
             errors = f"{singular(name)}_errors" if name in EACH else f"{name}_error"
-            if POOR * np.abs(each).max() < np.median(getattr(gradient, errors)) < np.inf:
+            if 0 < POOR * np.abs(each).max() < np.median(getattr(gradient, errors)) < np.inf:
                 said = f"most derivatives by {name} have error bounds above {POOR:g} of the largest"
                 warnings.warn(said, stacklevel=2)
         if "force" in slopes and gradient.maximum is not None:

@@ -77,9 +77,9 @@ def _draw_loop(axes: Axes, path: LoadPath, scale: Scale, fine: LoadPath) -> None
 
 def _draw_cost(axes: Axes, path: LoadPath, scale: Scale, fine: LoadPath) -> None:
     """Draw the energy lost since the beginning against the number of the point."""
-    m = len(path.losses)
+    m, each = len(path.losses), len(fine.losses) // len(path.losses)
     energy = scale.energy(float(path.losses.max(initial=0.0)))
-    at = np.arange(1.0, len(fine.losses) + 1) * m / max(1, len(fine.losses))
+    at = np.add.outer(np.arange(m), _parts(each)).ravel()
     colours = _draw_darkening(axes, path, at, energy.of(fine.losses))
     if m <= MOST_NUMBERS:
         axes.plot(np.arange(1.0, m + 1), energy.of(path.losses), "o", ms=3.5, color=SMOOTH)
@@ -155,6 +155,11 @@ def _maps(path: LoadPath, scale: Scale) -> Figure:
     return figure
 
 
+def _parts(each: int) -> Array:
+    """(each,) parts of a segment from its beginning, denser at the ends; the last is 1."""
+    return 0.5 - 0.5 * np.cos(np.pi * np.arange(1, each + 1) / each)
+
+
 def _finer(path: LoadPath) -> LoadPath:
     """The path with points added between the given ones.
 
@@ -170,7 +175,7 @@ def _finer(path: LoadPath) -> LoadPath:
     if each < 2 or path.order == "fails" or not path.contact.loads.any() or not follows_on:
         return path
     corners = np.column_stack((path.loads, path.forces))
-    part = 0.5 - 0.5 * np.cos(np.pi * np.arange(1, each) / each)  # denser at the ends
+    part = _parts(each)[:-1]
     pieces = [
         np.vstack((a + part[:, None] * (b - a), b))
         for a, b in pairwise(np.vstack(([path.start, 0.0], corners)))

@@ -156,7 +156,8 @@ def _map(surface: Surface, summits: Summits, contact: Contact | None) -> Figure:
         width, height = (min(edge, length.of(side / 2)) for side in surface.size)
         axes.set(xlim=(-width, width), ylim=(-height, height))
     size = float(np.clip(60.0 / np.sqrt(len(positions) + 1), 0.4, 4.0))
-    axes.plot(*positions.T, "o", ms=size, mew=0.0, color=SUMMIT, rasterized=len(positions) > MANY)
+    axes.plot(*positions.T, "o", ms=size, mew=0.0, color=SUMMIT, zorder=0.9,  # below contacts
+              rasterized=len(positions) > MANY)  # fmt: skip
     style.bar(axes, image, z.short("z"), above=True)
     handles.insert(0, style.disc_handle(SUMMIT, f"summits ({shown})"))
     style.legend(figure, "outside", handles=handles, loc="outside lower center", ncols=3)

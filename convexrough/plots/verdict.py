@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from convexrough.compare import Comparison
+from convexrough.comparison import Comparison
 from convexrough.normal.claims import Claim
 from convexrough.plots import asperity_map as maps
 from convexrough.plots import style

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from convexrough.compare import CARRIES, Comparison, Entry
+from convexrough.comparison import CARRIES, Comparison, Entry
 from convexrough.run.results import headed
 from convexrough.run.stage import Summary, numbers, unit_of
 from convexrough.run.stages.normal import COUNTS

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Indices
-from convexrough.compare import joined
+from convexrough.comparison import joined
 from convexrough.errors import ConvexroughError
 from convexrough.normal.claims import Claim
 from convexrough.plausibility import described_modulus

@@ -67,7 +67,7 @@ class Entry(Record):
     The reference is Newton's method. If it or this solver has no solution, `disagreement` is nan,
     and the two numbers of asperities are None.
 
-    >>> reference, found = cr.compare.compare(scene, approach=5e-5, solvers=["conic"]).entries
+    >>> reference, found = cr.compare(scene, approach=5e-5, solvers=["conic"]).entries
     >>> found.outcome, found.disagreement < 1e-9, found.different_statuses
     ('answered', True, 0)
     """
@@ -90,7 +90,7 @@ class Comparison(Table, Plottable):
     contradictions : a sentence for each contradiction between two certified results, at least one
         of global scope; each shows a mistake in the mathematics or in the code of the package
 
-    >>> found = cr.compare.compare(scene, approach=5e-5, solvers=["conic"])
+    >>> found = cr.compare(scene, approach=5e-5, solvers=["conic"])
     >>> len(found.contacts), found.certified, found.disagreeing(within=1e-9)
     (2, True, {})
     """
@@ -166,7 +166,7 @@ def compare(
     Raises InputError if the reference does not accept the scene. Errors of the other solvers are
     reported in their entries.
 
-    >>> found = cr.compare.compare(scene, approach=5e-5, solvers=["conic"])
+    >>> found = cr.compare(scene, approach=5e-5, solvers=["conic"])
     >>> [entry.outcome for entry in found.entries], found.contradictions
     (['answered', 'answered'], ())
     """
@@ -206,7 +206,8 @@ def every_solver() -> tuple[solvers.Solver, ...]:
 
     Solvers of the package that end with a Newton step are also included without this step.
 
-    >>> [solver.name for solver in cr.compare.every_solver()][:3]
+    >>> from convexrough.comparison import every_solver
+    >>> [solver.name for solver in every_solver()][:3]
     ['newton', 'conic + Newton step', 'conic']
     """
     return (
@@ -229,7 +230,8 @@ def solver_named(name: str) -> solvers.Solver:
 
     Raises InputError if there is no such solver.
 
-    >>> cr.compare.solver_named("conic") == cr.solvers.Conic()
+    >>> from convexrough.comparison import solver_named
+    >>> solver_named("conic") == cr.solvers.Conic()
     True
     """
     module, _, attribute = name.rpartition(".")
@@ -302,9 +304,10 @@ def contradictions(first: Answer, second: Answer) -> list[str]:
     their error bounds, or if an asperity is proved to touch by one and to be open by the other. A
     result of scope "none" contradicts no other.
 
-    >>> one = cr.compare.Answer.of(contact)
+    >>> from convexrough.comparison import Answer, contradictions
+    >>> one = Answer.of(contact)
     >>> other = one._replace(name="another", loads=1.1 * contact.loads)
-    >>> [line.partition(" of ")[0] for line in cr.compare.contradictions(one, other)]
+    >>> [line.partition(" of ")[0] for line in contradictions(one, other)]
     ['newton and another: loads']
     """
     one, other = first.certificate, second.certificate
