@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Iterable, Sized
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -195,10 +197,19 @@ def instance(what: str, value: object, kind: type) -> None:
 
 def shown(value: object) -> str:
     """A value for one line of an error message: its text, shortened, or its type."""
+    if isinstance(value, np.ndarray) and value.ndim:
+        return f"an array of {value.dtype.name}"
     text = repr(value)
     if "\n" in text:
         return f"type {type(value).__name__}"
     return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def path(what: str, value: object, expected: str) -> Path:
+    """A path. Raises InputError for a value of another kind."""
+    if not isinstance(value, (str, os.PathLike)):
+        raise InputError(what, found=shown(value), expected=expected)
+    return Path(value)
 
 
 def sequence(what: str, values: object, expected: str) -> None:

@@ -68,7 +68,8 @@ def blamed_on(where: object, table: str = "", *, unless_known: bool = False) -> 
     try:
         yield
     except InputError as error:
-        if isinstance(error, MistakesError) or (unless_known and error.where):
+        stage = error.where.startswith("[")  # a table, not a file
+        if isinstance(error, MistakesError) or (unless_known and error.where and not stage):
             raise
         raise error.located(str(where), table) from error
 

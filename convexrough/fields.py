@@ -124,6 +124,7 @@ def _sheared(state: ShearState) -> tuple[Array, Array, Array, Array]:
 
     Q_i / (f P_i) is exactly 1 or -1 if the asperity slides.
     """
+    checks.instance("state", state, ShearState)
     contact, f = state.contact, checks.friction(state.contact.scene.friction)
     touching, centres, radii = _discs(contact)
     shares = state.forces[touching] / (f * contact.loads[touching])

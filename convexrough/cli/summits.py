@@ -163,8 +163,8 @@ def summits(
             "hint", "use --scene or --radius to press on the summits and choose --prune"
         )
     if how.scene is not None and (other := _other_table(how.scene, folder / "summits.csv")):
-        table = new.files[0].name
-        common.say_aside("hint", f"{how.scene} reads {other}, which is not {folder / table}")
+        table = folder / new.files[0].name
+        common.say_aside("hint", f"{how.scene} reads {other}, and this run wrote {table}")
     return common.DONE if scanned.certified else common.NOT_CERTIFIED
 
 
@@ -175,4 +175,4 @@ def _other_table(scene: Path, table: Path) -> str:
     layout = read_study(scene)[0].asperities
     if layout.pattern != "file" or (scene.parent / layout.path).resolve() == table.resolve():
         return ""
-    return layout.path
+    return str(scene.parent / layout.path)

@@ -53,8 +53,8 @@ class Shakedown(Table, Plottable):
         does not touch at P0; for "vector" all are equal
     gross   : the factor at which the path reaches the friction limit f P of the whole contact
     witness : (n,) or (n, 2) [force] residual shear forces with which none slides at `lower`
-    mechanism : (n,) slips at a factor slightly above `upper`, the largest scaled to 1; for "vector"
-        (m, n, 2), at each point of the path
+    mechanism : (n,) slips at a factor slightly above `upper`, the largest scaled to 1; where
+        opening limits the factor, gaps; for "vector" (m, n, 2), at each point of the path
     order   : for "exact" as `Cycle.order`; bounds are proved only if it is "proved". Else None
     load, force : [force] P0 and Q0; Q0 is (2,) for "vector"
     load_amplitudes, force_amplitudes : (m,) [force] p and q; q is (m, 2) for "vector"

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
 
+from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.friction.cycle import Cycle, Loop
 from convexrough.friction.cycle import loops as steady_loops
@@ -44,6 +45,7 @@ def cycle_figures(cycles: Sequence[Cycle], *, loops: Sequence[Loop] | None = Non
     >>> print(*cr.plots.cycle_figures(cr.cycles(contact, forces)))
     hysteresis loss
     """
+    checks.sequence("cycles", cycles, "a list of cycles")
     if not cycles:
         return Figures()
     contact = cycles[0].contact
@@ -230,6 +232,7 @@ def fretting_figures(worn: Fretting) -> Figures:
     >>> print(*cr.plots.fretting_figures(worn))
     fretting
     """
+    checks.instance("worn", worn, Fretting)
     if not worn.contact.loads.any():
         return no_contact("fretting")
     scale = Scale(worn.contact)

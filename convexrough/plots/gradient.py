@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from matplotlib.axes import Axes
 
+from convexrough import checks
 from convexrough.gradients.gradient import Gradient
 from convexrough.plots import style
 from convexrough.plots.asperity_map import draw_values
@@ -21,6 +22,7 @@ def gradient_figures(gradient: Gradient, *, of: str = "J") -> Figures:
     >>> print(*cr.plots.gradient_figures(contact.gradient(load=1.0), of="P"))
     gradient
     """
+    checks.instance("gradient", gradient, Gradient)
     figure, (axes,) = panels(SINGLE + 0.7, 3.3)
     draw_gradient(axes, gradient, of)
     return Figures({"gradient": figure})

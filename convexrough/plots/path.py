@@ -10,6 +10,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colors import ListedColormap, Normalize
 
+from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.friction.path import LoadPath, history, load_path
 from convexrough.plots import style
@@ -42,6 +43,7 @@ def path_figures(path: LoadPath) -> Figures:
     >>> print(*cr.plots.path_figures(past))
     history
     """
+    checks.instance("path", path, LoadPath)
     if path.load_constant and not path.contact.loads.any():
         return no_contact("history")
     scale, fine = Scale(path.contact), _finer(path)

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, to_rgba
 
-from convexrough import fields
+from convexrough import checks, fields
 from convexrough.arrays import Array
 from convexrough.contact import Contact
 from convexrough.plots import style
@@ -34,6 +34,7 @@ def press_figures(contact: Contact) -> Figures:
     >>> print(*cr.plots.press_figures(contact))
     pressure loads
     """
+    checks.instance("contact", contact, Contact)
     if not contact.loads.any():
         return no_contact("pressure", "loads")
     scale = Scale(contact)

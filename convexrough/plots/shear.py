@@ -10,6 +10,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from convexrough import checks
 from convexrough.friction.shear import ShearState
 from convexrough.plots import asperity_map as maps
 from convexrough.plots import style
@@ -33,6 +34,7 @@ def shear_figures(states: Sequence[ShearState]) -> Figures:
     >>> print(*cr.plots.shear_figures(states))
     stick_slip
     """
+    checks.sequence("states", states, "a list of states")
     if not states:
         return Figures()
     if not states[0].contact.loads.any():

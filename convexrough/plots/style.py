@@ -264,7 +264,8 @@ class Scale:
     def energy(self, largest: float) -> Measure:
         """The measure of energies up to the largest."""
         unit = self.units.name("work")
-        return measure(largest if unit else self.work, unit, "W_0")
+        symbol = "W_0" if self.sphere else "(4.8\\,fPX_0)"
+        return measure(largest if unit else self.work, unit, symbol)
 
     def footnote(self) -> str:
         """A line that says what f P and X0 are."""

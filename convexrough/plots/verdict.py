@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullFormatter
 
+from convexrough import checks
 from convexrough.comparison import Comparison
 from convexrough.normal.claims import Claim
 from convexrough.plots import asperity_map as maps
@@ -35,6 +36,8 @@ def verdict_figures(verdict: Claim, sheared: Claim | None = None) -> Figures:
     verdict
     """
     claims = [verdict] if sheared is None else [verdict, sheared]
+    for claim in claims:
+        checks.instance("verdict", claim, Claim)
     figure, places = panels(SINGLE if sheared is None else DOUBLE, 3.9, 1, len(claims))
     for axes, claim in zip(places, claims, strict=True):
         draw_claim(axes, claim)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from convexrough import checks
 from convexrough.contact import Contact, assembled, solve
 from convexrough.errors import FileError, InputError, SceneFileError, blamed_on, file_errors
 from convexrough.influence import Kind
@@ -131,9 +132,7 @@ def read_scene(path: str | os.PathLike[str], *, asperities: Asperities | None = 
     >>> len(file.scene)
     61
     """
-    if not isinstance(path, (str, os.PathLike)):
-        raise InputError("path", found=repr(path)[:60], expected="the name of a scene file")
-    path = Path(path)
+    path = checks.path("path", path, "the name of a scene file")
     study, text = read_study(path)
     named, origin = study.units.names.length, getattr(asperities, "origin", None)  # of a map
     if origin and bool(origin.unit) != bool(named):  # `Scene` compares units that are both named

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.errors import InputError, blamed_on
 from convexrough.surface import map_arrays
@@ -105,8 +106,8 @@ def read(
     >>> cr.surface.read(folder / "scan.npz", pixel=2.5, unit="µm").size
     (160.0, 160.0)
     """
+    path = checks.path("path", path, "the name of a file with a map")
     with blamed_on(path, unless_known=True):
-        path = Path(path)
         kind = path.suffix.lower()
         with reading(path):
             if kind in TEXT:

@@ -221,7 +221,7 @@ class Surface(Record, Plottable):
         sphere
         """
         if kind not in TRENDS:
-            expected = '"plane", "sphere" or "paraboloid"'
+            expected = '"plane", "sphere" or "paraboloid"; in `read` also None'
             raise InputError("detrend", found=repr(kind), expected=expected)
         trend, there = fitted(self._measured, self.pixel, kind)
         left = pixels.filled(self.heights - there)

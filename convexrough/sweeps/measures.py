@@ -42,6 +42,9 @@ Numbers = dict[tuple[str, str], float]
 #: loaded asperities start to slide.
 ONSET, QUANTILES = "onset", (0.0, 0.25, 0.5, 0.75, 1.0)
 
+#: What a message on a wrong name of a number is about.
+MEASURE = "[sweep] measure"
+
 #: Errors that mean that one scene failed; other scenes are still computed.
 FAILURES = (ConvexroughError, ArithmeticError, MemoryError, np.linalg.LinAlgError)
 
@@ -129,10 +132,11 @@ def chosen(
     columns = []
     for name in measures:
         if not number(name):
-            names = sorted({each.rpartition(".")[2] for each in rows} | {ONSET})
+            whole = {*rows} if "." in name else {each.rpartition(".")[2] for each in rows}
+            names = sorted(whole | {ONSET})
             given = ", ".join(f"[{stage}]" for stage in stages)
             expected = f"a number of the tables {given}: {checks.nearest(name, names)}"
-            raise InputError("[sweep] measure", found=f'"{name}"', expected=expected)
+            raise InputError(MEASURE, found=f'"{name}"', expected=expected)
         known = number(name)
         columns += [Column(f"{name}_{row}" if row else name, known, row) for row in rows[known]]
     return tuple(columns)

@@ -23,7 +23,7 @@ from convexrough.solvers import Newton
 from convexrough.sweeps.batch import VERSIONS, Batch, Source, Tables, Tasks
 from convexrough.sweeps.folder import SCHEMA
 from convexrough.sweeps.grid import WHERE, Grid, swept, table_in, with_values
-from convexrough.sweeps.measures import FAILURES, Column, Stages, chosen, unit
+from convexrough.sweeps.measures import FAILURES, MEASURE, Column, Stages, chosen, unit
 from convexrough.tabular.units import UnitNames
 from convexrough.version import __version__
 
@@ -197,6 +197,7 @@ def _planned(
     """
     tried = sorted({(source.count - 1) * k // (TRIED - 1) for k in range(TRIED)})
     ask, rows = source.part(tried).opened(), dict[str, list[str]]()
+    wrong: Exception | None = None
     with blamed_on(said["source"], unless_known=True):
         for number in tried:
             try:
@@ -204,9 +205,12 @@ def _planned(
                 contact = asked.press()
                 columns = chosen(contact, asked.stages, measures, rows)
                 break
-            except FAILURES:
-                if number == tried[-1]:
-                    raise
+            except FAILURES as error:
+                if wrong is None or getattr(error, "what", "") == MEASURE:
+                    wrong = error
+        else:
+            assert wrong is not None  # `tried` is not empty
+            raise wrong
     few = -(-source.count // LEAST_BATCHES)
     contents = {"version": __version__, "measure": list(measures), **given}
     inputs = hashlib.sha256(json.dumps(contents, sort_keys=True, default=repr).encode())

@@ -6,7 +6,6 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -39,7 +38,7 @@ def open_sweep(folder: str | os.PathLike[str]) -> SweepTable:
     >>> cr.open_sweep(folder / "a").counts()
     {'certified': 1, 'undecided': 0, 'failed': 0}
     """
-    found = open_folder(Path(folder))
+    found = open_folder(checks.path("folder", folder, "the folder of a sweep"))
     return SweepTable(found.manifest, found)
 
 

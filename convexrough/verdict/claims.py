@@ -231,6 +231,7 @@ def _contradicted(loads: Array, floor: float, table: ReadTable) -> Iterator[str]
             right = next(each for each, it in known.items()
                          if it != said[i] and (each in FLAGS) == (found[i] in FLAGS))  # fmt: skip
             expected = f'expected "{right}", as the load is {float(loads[i])!r}'
+            expected += f", at most the --floor {floor:g}" if 0 < loads[i] <= floor else ""
             yield table.mistake(int(i), f', column {header}: found "{found[i]}", {expected}')
 
 

@@ -193,9 +193,14 @@ class Placing:
         count = np.arange(len(self.scene))
         named, others = dict[str, Indices](), dict[str, Indices]()
         for name, cells in self.table.others.items():
-            if cells.dtype.kind != "f" or (np.floor(cells) != cells).any():
-                continue
-            if not ((cells >= 0) & (cells < 2**53)).all():
+            whole = np.zeros(len(cells), dtype=bool)
+            if cells.dtype.kind == "f":
+                whole = (np.floor(cells) == cells) & (cells >= 0) & (cells < 2**53)
+            if not whole.all():
+                if bare(name).lower() in SURELY_INDEX:
+                    found = f"{cells[~whole][0]} in {self.table.rows[int(np.argmin(whole))]}"
+                    right = "whole numbers from 0 or 1; rename the column if rows are in order"
+                    self.mistakes.append(f"column {name}: found {found}, expected {right}")
                 continue
             index = cells.astype(np.intp)
             least, falls = index.min(), (np.diff(index) < 0).any()

@@ -123,6 +123,10 @@ def test_the_path_passes_through_every_step() -> None:
     assert_allclose(energies[:, 1], done.losses / sphere.energy_scale, rtol=1e-9)
     curve = np.concatenate([piece.vertices for piece in path.collections[0].get_paths()])
     assert all(np.abs(curve - end).sum(axis=1).min() < 1e-9 for end in ends)
+    spent = np.concatenate([piece.vertices for piece in cost.collections[0].get_paths()])
+    part, lost = spent[np.argmin(np.abs(spent[:, 0] - 0.75))]  # the force grows evenly in a step
+    there = cr.history(done.contact, forces=[part * done.forces[0]])
+    assert_allclose(lost, there.losses[0] / sphere.energy_scale, rtol=1e-9)
     numbers = {text.get_text() for text in path.texts}
     assert numbers == {"1, 5", "2", "3", "4"}  # the loop closes on its first point
 

@@ -476,6 +476,10 @@ WRONG = [
      "uniform = [low, high] with low < high"),
     (tables(sweep={"measure": ["los"]}), 'measure: found "los", expected a number of the tables '
      '[normal], [cycle]: did you mean "loss"?'),
+    ({**tables(cycle=None, path={"loads": [1e-7], "forces": [1e-9]}),
+      "sweep": {"measure": ["path.losss"], "over": {"friction.coefficient": [0.5, 1e-3]}}},
+     'measure: found "path.losss", expected a number of the tables [normal], [path]: did you mean '
+     '"path.loss"?'),
     ({**tables(cycle=None, friction=None), "sweep": {"measure": ["onset"]}},
      "friction: found none, expected a coefficient"),
 ]  # fmt: skip

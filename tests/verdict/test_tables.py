@@ -215,6 +215,8 @@ def test_loads_at_a_slightly_different_place(tmp_path: Path) -> None:
         ("1,2,3,4,5,6,7,8,9,0,1\n" * 9, "a map of pressures also needs coordinates: x, y and pres"),
         ("1,2,3\n4,5,6\n7,8,9\n", "columns 1, 2: found 0 positions of asperities in 3 rows"),
         ("node,load\n103,1\n101,1\n102,1\n", "column node: found 103, expected at most 3, the"),
+        ("index,load\n1,1\n0.5,1\n2,1\n", "column index: found 0.5 in row 3, expected whole numb"),
+        ("asperity,load\na1,1\na0,1\na2,1\n", "column asperity: found a1 in row 2, expected whole"),
         ("x_pos,y_pos,load\n0,0,1\n1,0,1\n2,0,1\n", "expected --column x=x_pos --column y=y_pos"),
         (b"PK\x03\x04...", "not text: an archive or an Excel workbook; name it .xlsx"),
         (b"MATLAB 5.0 MAT-file", "not text: a MAT-file; name it .mat"),

@@ -145,10 +145,7 @@ class CycleStage(Stage):
 
 class CycleResult(Result):
     stage: CycleStage
-    title = (
-        "steady cycles: amplitudes Qa of the force and Xa of the displacement, energy loss W; "
-        "W0: six times a smooth sphere's W at the onset of gross sliding"
-    )
+    title = "steady cycles: amplitudes Qa of the force and Xa of the displacement, energy loss W"
     digits = 6
     printed = heads(
         "maximum_fraction: max/(fP), minimum_fraction: min/(fP), force_amplitude: Qa, "
@@ -216,7 +213,8 @@ class CycleResult(Result):
 
     def lines(self) -> list[str]:
         if "loss_normalised" in self.headings():
-            return super().lines()
+            said = "W0: six times the smooth body's W at the onset of gross sliding"
+            return [*super().lines(), said]
         bodies = "a flat or a cylinder has no smooth reference"
         why = bodies if self.contact.load else "no asperity carries a load"
         return [*super().lines(), f"no W/W0: {why}"]

@@ -280,7 +280,8 @@ class ShakedownResult(Result):
         (found,) = self.found
         above = {
             "sliding": "above the factor an asperity slides in every cycle",
-            "opening": "above the factor an asperity opens in every cycle, and need not slide",
+            "opening": "above the factor an asperity that touches at the mean load opens in every "
+            "cycle, and need not slide",
             None: "sliding dies out at every factor",
         }
         return [f"shakedown  ({self.stage.kind}), {above[found.limited_by]}", *table]
