@@ -213,6 +213,9 @@ def test_a_common_factor_makes_no_suspects(contact: cr.Contact, factor: float) -
     assert not verdict.holds
     assert len(verdict.suspects) == 0
     assert f"{factor:g} times" in "".join(verdict.hints()) or factor == 1000.0
+    first = cr.press(contact.scene, approach=1e-6)  # of a single asperity its load is wrong
+    alone = cr.verify(contact.scene, first.loads * factor, approach=1e-6)
+    assert alone.suspects.tolist() == np.flatnonzero(first.loads).tolist()
 
 
 @pytest.mark.parametrize("kind", [Fraction, Decimal])

@@ -244,7 +244,7 @@ class Claim(ABC):
 
         A single missing, spurious or wrong force comes first; two exchanged forces are the first
         two. Forces with another sum than the solution are also compared after scaling to its sum;
-        if that removes most of the error, no force stands out.
+        if that removes most of the error, and more than one force differs, none stands out.
         """
         wrong, nearby = self.wrongly_claimed, self.nearby()
         if nearby is None or self.near_enough:
@@ -257,8 +257,9 @@ class Claim(ABC):
         least = np.maximum(np.where(np.isfinite(bounds), bounds, 0.0), SUSPICIOUS * apart.max())
         order, unscaled = np.argsort(-apart, kind="stable"), np.abs(self.values - true)
         stand_out = (apart > least) & (unscaled > least)
-        if apart.max() <= REMAINING * unscaled.max():  # all are wrong by a common factor
-            stand_out[:] = False
+        if apart.max() <= REMAINING * unscaled.max():  # all by a common factor, or only one
+            stand_out = unscaled > SUSPICIOUS * unscaled.max()
+            stand_out &= np.count_nonzero(stand_out) == 1
         stand_out[wrong] = True
         return frozen(order[stand_out[order]])
 

@@ -197,7 +197,7 @@ class Placing:
             if cells.dtype.kind == "f":
                 whole = (np.floor(cells) == cells) & (cells >= 0) & (cells < 2**53)
             if not whole.all():
-                if bare(name).lower() in SURELY_INDEX:
+                if bare(name).lower() in SURELY_INDEX and len(cells) == len(count):
                     found = f"{cells[~whole][0]} in {self.table.rows[int(np.argmin(whole))]}"
                     right = "whole numbers from 0 or 1; rename the column if rows are in order"
                     self.mistakes.append(f"column {name}: found {found}, expected {right}")
