@@ -22,7 +22,7 @@ Sites = NDArray[Any]  # whole numbers
 SITE_ERROR = 32 * 2.0**-53
 
 #: Largest accepted distance of points from the sites, divided by the spacing of the lattice.
-CLOSEST = 1e-7
+CLOSEST = 1e-10
 
 #: Lattices with a spacing below this part of the largest coordinate are not used.
 FINEST = 1e-12
