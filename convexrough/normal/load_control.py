@@ -95,7 +95,8 @@ def approach_bound(
 def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -> float:
     """Upper bound [length] on the approach at every solution of total `load` [force].
 
-    It is `approach_bound` with the weights `smooth_loads`.
+    It is `approach_bound` with the weights `smooth_loads`. Where contact discs under these would
+    reach their nearest neighbours, smaller loads are the weights, as the bound would be useless.
     """
     modulus = scene.material.contact_modulus
     coefficients = hertz.local_coefficient(modulus, scene.relative_radii)
@@ -104,6 +105,11 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
     every = one_box or len(scene) <= FEW_ASPERITIES
     which = np.arange(len(scene)) if every else np.flatnonzero(weights)
     sources = couple(scene, which, 1.0 / (np.pi * modulus), influence)
+    if not one_box:
+        deepest = sources.separations() ** 2 / scene.relative_radii[which]
+        fitting = np.minimum(weights[which], hertz.load(deepest, coefficients[which]))
+        if fitting.any():
+            weights[which] = fitting
     couplings: list[tuple[Indices, Coupling]] = [(which, sources)]
     if not every:
         others = np.flatnonzero(weights == 0)

@@ -68,6 +68,17 @@ def test_the_approach_bound_holds_for_any_weights(sampled: Case, seed: int) -> N
     assert bound * problem.units.length >= approach * (1 - 1e-12)
 
 
+@pytest.mark.parametrize("kind", ["dense", "scattered"])
+def test_a_close_pair_does_not_make_candidates_of_all(kind: Kind) -> None:
+    regular = cr.Asperities.square(spacing=0.0025, tip_radius=0.002, within=0.04).positions
+    points = np.vstack((regular, regular[np.argmin(np.hypot(*regular.T))] + [1e-9, 0.0]))
+    bounds = [
+        highest_approach(cr.Scene(1.0, cr.Asperities(each, 0.002), MATERIAL), 1e-7, kind)
+        for each in (regular, points)
+    ]
+    assert bounds[1] <= 1.05 * bounds[0]
+
+
 @settings(max_examples=8, deadline=None)
 @given(random_cases(crowding=0.99), st.integers(0, 2**32 - 1), st.floats(-6, 3))
 def test_newton_converges_from_any_start(sampled: Case, seed: int, size: float) -> None:
