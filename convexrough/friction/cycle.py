@@ -35,8 +35,7 @@ from convexrough.scene.scene import Scene
 if TYPE_CHECKING:
     from convexrough.gradients.gradient import Gradient, Holding
 
-#: Where the load varies, the ranges of load through which the slip fronts move are cut into about
-#: this number of cells in total.
+#: Where the load varies, the path is cut into about this number of cells in total.
 CELLS = 64
 
 
@@ -64,7 +63,8 @@ class Cycle(Table, Plottable):
     balance_defect   : relative difference between `loss` and the loss by (1) of
         docs/theory/losses.md, as a check of rounding; nan unless `one_loop`, or for general steps
     loss_normalised  : loss / W0, with W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H). P is the highest load,
-        nu Poisson's ratio, G the shear modulus, a_H the contact radius of a smooth sphere under P
+        nu Poisson's ratio, G the shear modulus, a_H the contact radius of a smooth sphere under P;
+        for an ellipsoid W0 = (24/5) c_t f^2 P D with its approach D and Mindlin's ratio c_t
     smooth_normalised : loss of the smooth shape / W0; nan unless `one_loop`. Both ratios to W0 are
         nan if no asperity is loaded, or if the solution for the smooth shape is not known
     displacement_amplitude, displacement_error : [length] half the range of the displacement of one
@@ -146,9 +146,9 @@ class Cycle(Table, Plottable):
         """(n,) [force length] energy lost at each asperity per cycle.
 
         The values are nan if general steps give the results (see `order`). Where the load varies,
-        they are sums over about 64 cells of the ranges of load through which slip fronts move.
-        Their relative errors are about 0.1 % if the load changes little, and some per cent if it
-        falls to 0. The proved bounds on the relative errors are some per cent.
+        they are sums over about 64 cells of the path. The relative error of their total is below
+        1 % if the load falls to no less than half, some per cent if it falls to 0, and larger if
+        hardly anything slips. `asperity_loss_errors` are bounds, often ten times the errors.
         """
         return self._shares[2]
 

@@ -228,14 +228,16 @@ def _sharper(a: Ball, b: Ball) -> Ball:
 def shared(levels: FrictionLevels, pieces: Sequence[Piece], cells: int) -> tuple[Ball, Ball]:
     """(N,) [force length] losses at each asperity, due to partial slip and to sliding.
 
-    Pieces with a varying load are cut into `cells` cells. The loss in one lies between the losses
-    at the loads of its ends (docs/theory/losses.md, "A front while the load changes"); the results
-    are sums of the means. Their relative errors are about cells^-2, the bounds about 1 / cells.
+    Pieces with a varying load are cut into `cells` cells, more where front and load change more.
+    The loss in one lies between the losses at the loads of its ends (docs/theory/losses.md, "A
+    front while the load changes"); the results are sums of the means. Their relative errors are
+    about cells^-2, the bounds about 1 / cells.
     """
-    run = sum((piece.top - piece.bottom for piece in pieces), Fraction(0))
+    sizes = [it.top - it.bottom + abs(it.load_after - it.load_before) for it in pieces]
+    run = sum(sizes, Fraction(0))
     parts = list[tuple[Fraction, Loads, Loads]]()  # weight; P and front at both ends of a cell
-    for piece in pieces:
-        part = 0.0 if piece.load_constant else float((piece.top - piece.bottom) / run)
+    for piece, size in zip(pieces, sizes, strict=True):
+        part = 0.0 if piece.load_constant else float(size / run)
         cut = max(1, round(cells * part))
         top, bottom, before, after = piece[2:]
         fronts, loads = (

@@ -204,7 +204,7 @@ def _known(
         friction = np.array([scene.friction for scene in scenes], dtype=np.float64)
         limits = friction * contacts["loads"]
         spheres = map(smooth_reference, scenes, contacts["loads"].tolist())
-        scales = np.array([np.nan if each is None else each.energy_scale for each in spheres])
+        scales = np.array([(each and each.energy_scale) or np.nan for each in spheres])
         for high, low in zip(cycle.maximum_fraction, cycle.lowest, strict=True):
             proved, cycles = rows.cycles(high * limits, low * limits, friction)
             good &= proved
