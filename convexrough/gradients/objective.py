@@ -126,6 +126,8 @@ class Objective(Record):
         gradient = self.gradient(parameters)
         slopes = {name: getattr(gradient, name) for name in self.by}
         for name, each in slopes.items():
+            if each is None:  # the force of a loss
+                continue
             errors = f"{singular(name)}_errors" if name in EACH else f"{name}_error"
             if 0 < POOR * np.abs(each).max() < np.median(getattr(gradient, errors)) < np.inf:
                 said = f"most derivatives by {name} have error bounds above {POOR:g} of the largest"
