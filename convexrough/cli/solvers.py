@@ -148,17 +148,14 @@ def gallery(
 
         with common.progress("timing"):
             found = profile_of([solver_named(each) for each in solvers] or None, cases=wanted)
-        table = found.rows()
-        cells = [[f"{x:.0%}" if isinstance(x, float) else x for x in row.values()] for row in table]
-        reported = [
-            row | {"outcomes": dict(zip(found.cases, each.tolist(), strict=True))}
-            for row, each in zip(table, found.outcomes, strict=True)
-        ]
-        output.say({"profile": reported}, aligned([list(table[0]), *cells], left=1))
-        outcomes = {*found.outcomes.ravel().tolist()} if solvers else set()
-        if "failed" in outcomes:
+        heads = [head for head in found[0] if head != "outcomes"]
+        table = [[row[head] for head in heads] for row in found]
+        cells = [[f"{x:.0%}" if isinstance(x, float) else x for x in row] for row in table]
+        output.say({"profile": found}, aligned([heads, *cells], left=1))
+        if solvers and any(row["failed"] for row in found):
             return common.SOLVER_FAILED
-        return common.NOT_CERTIFIED if "wrong" in outcomes else common.DONE
+        wrong = solvers and any(row["wrong"] for row in found)
+        return common.NOT_CERTIFIED if wrong else common.DONE
     cases = [wing.case(name) for name in wanted]
     lines = []
     if show_list or export is None:
