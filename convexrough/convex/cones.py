@@ -8,15 +8,14 @@ form is exact: 21/25 with four cones, 1 with five.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from convexrough.arrays import Array, Indices
+from convexrough.arrays import Array
 
 if TYPE_CHECKING:
-    from scipy.sparse import csc_array
+    from scipy.sparse import csr_array
 
 #: The largest S for which four cones are exact, and the largest S for which five cones are exact.
 FOUR_CONES_LIMIT, FIVE_CONES_LIMIT = 21 / 25, 1.0
@@ -37,30 +36,16 @@ FIVE_CONES = np.array([_Y1_AND_Y3, _Y2_AND_Y4, _Y3_AND_Y5, _PRODUCT, _WITH_Z], d
 SECOND_ORDER = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, 2.0]])
 
 
-class ConeRows(NamedTuple):
-    """Rows of a program:  constant - matrix @ variables  lies in second-order cones."""
+def power_cones(n: int, *, five: bool) -> tuple[csr_array, Array]:
+    """Rows with  constant - matrix @ variables  in second-order cones of dimension 3, for n lifts.
 
-    matrix: csc_array  # (3 cones, width)
-    constant: Array  # (3 cones,)
-    cones: int  # number of these cones, each of dimension 3
-
-
-def power_cones(lifts: Sequence[Indices], width: int) -> ConeRows:
-    """The cones of n lifts, grouped by lift, in a program with `width` variables.
-
-    lifts : for four cones, the columns of y2, y3, y4, y5 and z, (n,) each; for five cones, the
-        columns of y1, ..., y5 and z
+    Rows are grouped by lift. The variables are y2, y3, y4, y5 and z, (n,) each; for the form with
+    five cones y1, ..., y5 and z.
     """
-    from scipy.sparse import csc_array  # 0.1 s to import: only when solving
+    from scipy import sparse  # 0.1 s to import: only when solving
 
-    columns = np.stack(lifts)
-    names, n = columns.shape
-    cones = SECOND_ORDER @ (FIVE_CONES if names == 6 else FOUR_CONES)
-    rows = cones.reshape(-1, 7)  # rows of one lift
-    constant, coefficients = rows[:, 0], rows[:, 7 - names :]
-    row, name = np.nonzero(coefficients)
-    at = (len(rows) * np.arange(n) + row[:, None], columns[name])
-    values = np.broadcast_to(-coefficients[row, name][:, None], at[1].shape)
-    entries = (values.ravel(), (at[0].ravel(), at[1].ravel()))
-    matrix = csc_array(entries, shape=(len(rows) * n, width))
-    return ConeRows(matrix, np.tile(constant, n), len(cones) * n)
+    rows = (SECOND_ORDER @ (FIVE_CONES if five else FOUR_CONES)).reshape(-1, 7)  # of one lift
+    constant, coefficients = rows[:, 0], rows[:, 1 if five else 2 :]
+    by_row = sparse.csr_array(sparse.kron(-coefficients, sparse.eye_array(n)))
+    by_lift = np.arange(len(rows) * n).reshape(len(rows), n).T.ravel()
+    return by_row[by_lift], np.tile(constant, n)

@@ -77,7 +77,8 @@ class ConicStepper(Stepper):
         m, names = len(owner), 6 if 1.5 * shifts.max() > FOUR_CONES_LIMIT else 5
         lift = 2 * n + np.arange(names * m).reshape(names, m)
         width, (_, y3, _, y5, z) = 2 * n + names * m, lift[-5:]
-        powers = power_cones(list(lift), width)
+        cones, constant = power_cones(m, five=names == 6)
+        powers = sparse.hstack((sparse.csr_array((len(constant), 2 * n)), cones))
 
         scale, shift = energies / unit, shifts[owner]
         around = self.A[which] @ step.now.forces
@@ -108,8 +109,8 @@ class ConicStepper(Stepper):
         program = ConeProgram(
             quadratic=sparse.csc_array(sparse.block_diag(blocks)),
             linear=linear,
-            constraints=sparse.csc_array(sparse.vstack((sums, bounds, powers.matrix))),
-            constant=np.hstack((step.total / N.sum(), total, limits.ravel(), powers.constant)),
+            constraints=sparse.csc_array(sparse.vstack((sums, bounds, powers))),
+            constant=np.hstack((step.total / N.sum(), total, limits.ravel(), constant)),
             equalities=1 + n,
         )
         return program, unit

@@ -25,7 +25,7 @@ from convexrough.record import Record
 from convexrough.scene.scene import Scene
 from convexrough.solvers import Newton
 from convexrough.solvers.bristles import BristleProgram, BristleQP
-from convexrough.solvers.conic import ConeBoxes, LiftedProgram
+from convexrough.solvers.conic import ConeBoxes, lifted_program
 from convexrough.solvers.programs import ConeProgram, QuadraticProgram
 from convexrough.version import __version__
 
@@ -223,7 +223,7 @@ def stated(problem: NormalProblem, own: Array, form: Form, bristles: int) -> Pro
             load_error_estimate=_bristle_error(rows, own),
         )
     boxes = _boxes(problem, own)
-    cones = LiftedProgram.assemble(problem, boxes).apply()
+    cones = lifted_program(problem, boxes)
     kind = f"second-order cones, {5 if boxes.five else 4} an asperity"
     p = own[boxes.members]
     t = np.cbrt(p / boxes.loads)

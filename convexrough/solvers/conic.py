@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -272,15 +273,14 @@ class Conic(ConeSolver):
 
     def answer(self, problem: NormalProblem, boxes: ConeBoxes) -> ProgramAnswer:
         """Clarabel's loads and approach for these boxes, not yet checked."""
-        lifted = LiftedProgram.assemble(problem, boxes)
         raw = run_clarabel(
-            lifted.apply(),
+            lifted_program(problem, boxes),
             self.name,
             self.tolerance,
             max_iter=self.max_iterations,
             direct_solve_method="faer" if len(boxes.members) >= SUPERNODAL else "qdldl",
         )
-        answer = lifted.invert(raw)
+        answer = answer_of(problem, boxes, raw)
         if raw.status not in STOPPED:
             raise SolverError(
                 f"clarabel stopped after {raw.iterations} steps with {raw.status}",
@@ -291,59 +291,48 @@ class Conic(ConeSolver):
         return answer
 
 
-@dataclass(frozen=True, eq=False)
-class LiftedProgram:
+def lifted_program(problem: NormalProblem, boxes: ConeBoxes) -> ConeProgram:
     """The cone program on boxes of loads (docs/theory/exact-cones.md, "The lifted program").
 
     The variables are, in blocks of n, the loads p, then y2 to y5 for the powers t^2 to t^5 of
     t = (p / B)^(1/3), with the upper ends B of the boxes, and z for t^5 - t^6. The form with five
-    cones also has y1 for t, before y2.
+    cones also has y1 for t, before y2. There are rows for the prescribed total, if any, for
+    p = B y3, and for cones.
     """
+    from scipy import sparse  # 0.1 s to import: only when solving
 
-    problem: NormalProblem
-    boxes: ConeBoxes
+    members, n, lifts = boxes.members, len(boxes.members), 6 if boxes.five else 5
+    checks.fits_in_memory("asperities of the cone program", n, 100, power=2)
+    k_box, S = boxes.energies(problem), boxes.S
+    M = problem.influence.matrix[np.ix_(members, members)]
+    np.fill_diagonal(M, problem.shells[members])
+    level = problem.approach_bound if problem.approach is None else problem.approach
+    linear = np.zeros((1 + lifts, n))
+    linear[0] = -(level + problem.offsets[members])
+    linear[-2] = k_box * (3 / 5 - S / 3)  # y5
+    linear[-1] = k_box * S / 3  # z
 
-    @classmethod
-    def assemble(cls, problem: NormalProblem, boxes: ConeBoxes) -> LiftedProgram:
-        checks.fits_in_memory("asperities of the cone program", len(boxes.members), 100, power=2)
-        return cls(problem, boxes)
+    y3 = np.eye(1, lifts, lifts - 4)
+    cones, constant = power_cones(n, five=boxes.five)
+    boxed = sparse.kron(y3, sparse.diags_array(boxes.loads))  # B y3
+    rows: list[list[Any]] = [[sparse.eye_array(n), -boxed]]
+    right = np.zeros(n)
+    if problem.load is not None:
+        rows.insert(0, [np.ones((1, n)), None])
+        right = np.append(problem.load, right)
+    upper, empty = sparse.csc_array(np.triu(M)), sparse.csc_array((lifts * n, lifts * n))
+    return ConeProgram(
+        quadratic=sparse.csc_array(sparse.block_diag((upper, empty))),
+        linear=linear.ravel(),
+        constraints=sparse.csc_array(sparse.block_array([*rows, [None, cones]])),
+        constant=np.append(right, constant),
+        equalities=len(right),
+    )
 
-    def apply(self) -> ConeProgram:
-        """The program, with rows for the prescribed total, if any, for p = B y3, and for cones."""
-        from scipy import sparse  # 0.1 s to import: only when solving
 
-        problem, boxes = self.problem, self.boxes
-        members, n = boxes.members, len(boxes.members)
-        k_box, S = boxes.energies(problem), boxes.S
-        blocks = np.arange((7 if boxes.five else 6) * n).reshape(-1, n)
-        p, lift = blocks[0], blocks[1:]
-        y3, y5, z = lift[-4], lift[-2], lift[-1]
-        width = blocks.size
-
-        M = problem.influence.matrix[np.ix_(members, members)]
-        np.fill_diagonal(M, problem.shells[members])
-        upper = np.triu_indices(n)
-        quadratic = sparse.csc_array((M[upper], (p[upper[0]], p[upper[1]])), shape=(width, width))
-        level = problem.approach_bound if problem.approach is None else problem.approach
-        linear = np.zeros(width)
-        linear[p] = -(level + problem.offsets[members])
-        linear[y5] = k_box * (3 / 5 - S / 3)
-        linear[z] = k_box * S / 3
-
-        link = np.concatenate((np.ones(n), -boxes.loads)), (np.tile(p, 2), np.append(p, y3))
-        rows, right = [sparse.csc_array(link, shape=(n, width))], [np.zeros(n)]
-        if problem.load is not None:
-            total = np.ones(n), (np.zeros(n, dtype=int), p)
-            rows.insert(0, sparse.csc_array(total, shape=(1, width)))
-            right.insert(0, np.array([problem.load]))
-        power = power_cones(list(lift), width)
-        constraints = sparse.csc_array(sparse.vstack([*rows, power.matrix], format="csc"))
-        constant = np.concatenate((*right, power.constant))
-        return ConeProgram(quadratic, linear, constraints, constant, sum(map(len, right)))
-
-    def invert(self, raw: RawAnswer) -> ProgramAnswer:
-        """The loads, and the approach: prescribed, or from the multiplier of the total load."""
-        approach = self.problem.approach
-        if approach is None:
-            approach = self.problem.approach_bound - float(raw.multipliers[0])
-        return ProgramAnswer(raw.x[: len(self.boxes.members)], approach, raw.iterations)
+def answer_of(problem: NormalProblem, boxes: ConeBoxes, raw: RawAnswer) -> ProgramAnswer:
+    """The loads, and the approach: prescribed, or from the multiplier of the total load."""
+    approach = problem.approach
+    if approach is None:
+        approach = problem.approach_bound - float(raw.multipliers[0])
+    return ProgramAnswer(raw.x[: len(boxes.members)], approach, raw.iterations)

@@ -1,8 +1,9 @@
 """Optimisation programs in standard form, their solution by libraries, and the answers.
 
-A reduction such as `conic.LiftedProgram` converts a contact problem to a program by `apply`, and
-the answer back by `invert`, as in cvxpy (Agrawal, Verschueren, Diamond and Boyd, J. Control Decis.
-5 (2018) 42). docs/how-to/solvers.md shows how to add a solver.
+A reduction converts a contact problem to a program, and the answer back, as in cvxpy (Agrawal,
+Verschueren, Diamond and Boyd, J. Control Decis. 5 (2018) 42): `conic.lifted_program` and
+`conic.answer_of`, or `apply` and `invert` of `bristles.BristleProgram`. docs/how-to/solvers.md
+shows how to add a solver.
 """
 
 from __future__ import annotations

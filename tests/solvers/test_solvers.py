@@ -13,7 +13,7 @@ import convexrough as cr
 from convexrough.influence import Kind
 from convexrough.normal.problem import NormalProblem
 from convexrough.solvers import BristleQP, Conic, ConicCVXPY, Newton, Solution, TooDenseError
-from convexrough.solvers.conic import ConeBoxes, LiftedProgram, solve_in
+from convexrough.solvers.conic import ConeBoxes, lifted_program, solve_in
 from convexrough.solvers.newton import ALL_ITERATED
 
 SOLVERS = [Conic(), ConicCVXPY(), ConicCVXPY(solver="QOCO")]  # SCS takes many steps
@@ -108,7 +108,7 @@ def test_too_large_for_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(psutil, "virtual_memory", lambda: SimpleNamespace(available=2**30))
     boxes = replace(ConeBoxes.choose(problem), members=np.arange(10**5))
     with pytest.raises(cr.InputError, match=r"asperities of the cone program: found 1e\+05"):
-        LiftedProgram.assemble(problem, boxes)
+        lifted_program(problem, boxes)
 
 
 @pytest.mark.sample(2)
