@@ -27,7 +27,7 @@ from convexrough.plottable import Plottable
 from convexrough.record import Along, Table, Variables
 from convexrough.roundoff import SAFETY
 from convexrough.scene.scene import Scene
-from convexrough.vector_shear.problem import FrictionProblem
+from convexrough.vector_shear.problem import FrictionProblem, in_plane
 
 Theory = Literal["exact", "elastic", "vector"]
 
@@ -159,12 +159,16 @@ def shakedown(
     P0 = checks.positive("load", load)
     if kind not in ("exact", "elastic", "vector"):
         raise InputError("kind", found=repr(kind), expected='"exact", "elastic" or "vector"')
+    Q0: Any
     if kind == "vector":
-        Q0, q = _vectors("force", force, 1)[0], _vectors("force_amplitudes", force_amplitudes, 2)
+        Q0, q = in_plane("force", force), checks.numbers("force_amplitudes", force_amplitudes)
+        if q.ndim != 2 or q.shape[1] != 2 or not np.isfinite(q).all():
+            expected = "finite numbers of shape (m, 2)"
+            raise InputError("force_amplitudes", found=f"shape {q.shape}", expected=expected)
     else:
         Q0 = checks.finite("force", cast("float", force))
         q = checks.array("force_amplitudes", np.atleast_1d(np.asanyarray(force_amplitudes)))
-    p = _alike("load_amplitudes", load_amplitudes, len(q))
+    p = checks.array("load_amplitudes", load_amplitudes, length=len(q), one="force amplitude")
     t0, t = Q0 / f, q / f
     if kind != "vector":  # exactly, as the factor can depend on small differences
         t0, t, p = Fraction(Q0) / Fraction(f), fractions(q) / Fraction(f), fractions(p)
@@ -294,25 +298,3 @@ def _elastic(contact: Contact, t0: Fraction, t: Any) -> dict[str, Any]:
         "witness": problem.to_scene(unit * (room_low + part * width)),
         "mechanism": problem.to_scene(np.asarray(critical, dtype=np.float64)),
     }
-
-
-def _vectors(what: str, values: ArrayLike, dimensions: int) -> Array:
-    """(m, 2) checked forces; m = 1 if `dimensions` is 1. Then a number stands for (number, 0)."""
-    given = checks.numbers(what, values)
-    if given.ndim == 0 and dimensions == 1:
-        given = np.array([float(given), 0.0])
-    if given.ndim != dimensions or given.shape[-1] != 2 or not np.isfinite(given).all():
-        shape = "two finite numbers" if dimensions == 1 else "finite numbers of shape (m, 2)"
-        raise InputError(what, found=f"shape {given.shape}", expected=shape)
-    return np.atleast_2d(given)
-
-
-def _alike(what: str, values: ArrayLike, count: int) -> Array:
-    """(count,) checked amplitudes; one number stands for all."""
-    given = checks.array(what, np.atleast_1d(np.asanyarray(values)))
-    if np.ndim(values) == 0:
-        return frozen(np.full(count, float(given[0])))
-    if len(given) != count:
-        expected = f"{count}, one for each of force_amplitudes"
-        raise InputError(what, found=f"{len(given)} values", expected=expected)
-    return given

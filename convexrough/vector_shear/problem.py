@@ -22,13 +22,14 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
 from convexrough.arithmetic.balls import Ball, where
 from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.contact import Contact
 from convexrough.convex.definite import proved_margin
+from convexrough.errors import InputError
 from convexrough.friction.levels import FrictionLevels
 from convexrough.influence import Influence
 from convexrough.influence.shells import shells
@@ -253,3 +254,14 @@ def along(lengths: Array, vectors: Array, sizes: Array) -> Array:
     """
     scale: Array = lengths / np.where(sizes > 0, sizes, 1.0)
     return vectors * scale[:, None]
+
+
+def in_plane(what: str, force: ArrayLike) -> Array:
+    """(2,) a checked force, of which a number is the component along x."""
+    if np.ndim(force) == 0:
+        return np.array([checks.array(what, force, length=1)[0], 0.0])
+    given = checks.array(what, force)
+    if given.shape != (2,):
+        expected = "a number, along x, or a pair (Qx, Qy)"
+        raise InputError(what, found=f"{given.size} numbers", expected=expected)
+    return given.copy()

@@ -25,7 +25,7 @@ from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.solvers import BristleQP, Conic, ConicCVXPY, Newton
 from convexrough.vector_shear.certificate import ROUNDED, VectorBounds, certify_vectors
 from convexrough.vector_shear.newton import FrictionNewton
-from convexrough.vector_shear.problem import FrictionProblem, VectorState, along
+from convexrough.vector_shear.problem import FrictionProblem, VectorState, along, in_plane
 
 
 class FrictionSolver(Protocol):
@@ -115,7 +115,7 @@ def shear_vector(
         expected = "a solver of friction, such as FrictionNewton() or FrictionConic()"
         raise InputError("solver", found=repr(solver)[:60], expected=expected)
     friction = checks.friction(contact.scene.friction)
-    Q = _vector(force)
+    Q = in_plane("force", force)
     size = checks.finite("force", float(np.hypot(*Q)))
     checks.bearable("force", size, friction * contact.load)
     if contact.load == 0.0:
@@ -171,16 +171,6 @@ def _solved(solver: FrictionSolver, problem: FrictionProblem, total: Array) -> V
         if np.shape(values) != shape or not np.isfinite(values).all():
             raise SolverError(f"no {what} were found: not finite numbers", solver=solver.name)
     return state._replace(total=total)
-
-
-def _vector(force: ArrayLike) -> Array:
-    if np.ndim(force) == 0:
-        return np.array([checks.array("force", force, length=1)[0], 0.0])
-    given = checks.array("force", force)
-    if given.shape != (2,):
-        expected = "a number, along x, or a pair (Qx, Qy)"
-        raise InputError("force", found=f"{given.size} numbers", expected=expected)
-    return given.copy()
 
 
 def _gross(problem: FrictionProblem, total: Array) -> VectorState:
