@@ -46,19 +46,11 @@ def named(solver: Solver | str | None) -> Solver:
         return Newton()
     if isinstance(solver, str) and solver in SOLVERS:
         return SOLVERS[solver]()
-    if isinstance(solver, (str, type)) or not callable(getattr(solver, "solve", None)):
+    parts = getattr(solver, "name", None), getattr(solver, "solve", None)
+    if isinstance(solver, (str, type)) or not (isinstance(parts[0], str) and callable(parts[1])):
         names = ", ".join(f'"{name}"' for name in SOLVERS)
-        expected = f"one of {names}, or settings such as solvers.Newton()"
-        raise InputError("solver", found=_short(solver), expected=expected)
-    if not isinstance(getattr(solver, "name", None), str):
-        raise InputError("solver", found=_short(solver), expected="an attribute `name`, a text")
+        kinds = f"one of {names}, or settings such as solvers.Newton()"
+        expected = f"{kinds}: an object with a text `name` and a method `solve`"
+        shown = repr(solver) if isinstance(solver, (str, type)) else f"type {type(solver).__name__}"
+        raise InputError("solver", found=shown, expected=expected)
     return solver
-
-
-def _short(solver: object) -> str:
-    if isinstance(solver, type):
-        return f"the class {solver.__name__}"
-    if isinstance(solver, str):
-        return repr(solver)
-    missing = "" if callable(getattr(solver, "solve", None)) else ", which has no method solve"
-    return f"type {type(solver).__name__}{missing}"

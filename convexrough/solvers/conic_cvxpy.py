@@ -220,10 +220,7 @@ class LiftedModel:
 
     def answer(self) -> ProgramAnswer:
         """The loads and the approach that the solver returns for the current program."""
-        return self.invert(self.settings.run(self.program))
-
-    def invert(self, raw: Any) -> ProgramAnswer:
-        """The loads, from the variable p, and the approach, from D0 or the multiplier."""
+        raw = self.settings.run(self.program)
         return ProgramAnswer(self.loads, self.approach, int(raw.solver_stats.num_iters or 0))
 
     @property
