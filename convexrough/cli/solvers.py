@@ -84,20 +84,20 @@ def export(output: common.Output, scene: Path, formats: tuple[str, ...], bristle
 
     Programs go to the folder SCENE-programs unless --out names another.
     """
-    from convexrough.programs.program import FORMATS, write_programs
+    from convexrough.programs.program import write_programs
     from convexrough.run.scene_file import read_scene
 
     file = read_scene(scene)
     writing = common.progress(f"writing programs of {len(file.scene):,} asperities")
     folder = output.folder(Path(f"{scene.stem}-programs"), reads=file.inputs)
     with folder as new, blamed_on(scene), writing:
-        new.files, index = write_programs(
-            new.path,
+        index = write_programs(
+            new.text,
             scene.stem,
             file.scene,
             approach=file.approach,
             load=file.load,
-            formats=formats or tuple(FORMATS),
+            formats=formats,
             bristles=bristles,
         )
     lines = [

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
-from convexrough.atomic import replacing
+from convexrough.atomic import write_text
 from convexrough.errors import ConvexroughError, InputError, SolverError
 from convexrough.normal.problem import NormalProblem
 from convexrough.programs.formats import cbf, clarabel_json, cone_npz, mps, qpsolvers_npz, sizes
@@ -38,14 +38,6 @@ WRITERS: dict[Form, dict[str, Callable[[Any], bytes]]] = {
     "cones": _OF_CONES,
     "dual": _OF_CONES,
     "bristles": {"npz": qpsolvers_npz, "mps": mps},
-}
-
-#: File endings, with the contents and the software that reads them.
-FORMATS = {
-    "cbf": "the cone program, and its dual, in the Conic Benchmark Format: MOSEK, PICOS, ...",
-    "json": "the cone program, and its dual, for clarabel.load_from_file",
-    "mps": "the quadratic program of bristles: HiGHS (which has no cones), Gurobi, CPLEX, ...",
-    "npz": "all programs: cones as sparse matrices, bristles for qpsolvers.Problem.load",
 }
 
 
@@ -134,9 +126,7 @@ class Program(Record):
         if (ending := path.suffix.removeprefix(".")) not in valid:
             expected = f"one of .{', .'.join(valid)} for the form {self.form}"
             raise InputError(str(path), found=f"the ending {path.suffix!r}", expected=expected)
-        content = valid[ending](self.data)
-        with replacing(path) as temporary:
-            temporary.write_bytes(content)
+        write_text(path, valid[ending](self.data))
 
     def about(self) -> dict[str, Any]:
         """Sizes, units and values of the program without its arrays, for an index of files."""
@@ -240,32 +230,32 @@ def stated(problem: NormalProblem, own: Array, form: Form, bristles: int) -> Pro
 
 
 def write_programs(
-    folder: Path,
+    write: Callable[[str, bytes], None],
     name: str,
     scene: Scene,
     *,
-    approach: float | None = None,
-    load: float | None = None,
-    formats: Collection[str] = tuple(FORMATS),
-    bristles: int = 64,
-) -> tuple[list[Path], dict[str, Any]]:
+    approach: float | None,
+    load: float | None,
+    formats: Collection[str],
+    bristles: int,
+) -> dict[str, Any]:
     """Write a file NAME.FORM.ENDING for each form and format, and index.json.
 
-    Returns the paths of all files, and the contents of the index.
+    Returns the contents of the index.
 
+    write    : writes a file, given its name and contents
     approach, load : [length], [force] the prescribed quantity, exactly one of the two
-    formats        : some of `FORMATS`
-    bristles       : number of bristles per asperity
+    formats  : file endings; all if there are none
+    bristles : number of bristles per asperity
 
     A program is left out if the solution is not in the box on which it is exact, or if its file
     would not fit in memory; the index gives the reason. If no program remains, the last of these
-    reasons is raised, a ConvexroughError. Raises FileError if a file cannot be written.
+    reasons is raised, a ConvexroughError.
     """
     problem, own = solved(scene, approach, load)
-    about, left_out, written = dict[str, Any](), dict[str, str](), list[Path]()
-    last: ConvexroughError = InputError("formats", found=formats, expected="at least one")
-    for form in FORMS:
-        endings = [ending for ending in WRITERS[form] if ending in formats]
+    about, left_out = dict[str, Any](), dict[str, str]()
+    for form, writers in WRITERS.items():
+        endings = [ending for ending in writers if ending in formats or not formats]
         try:
             program = stated(problem, own, form, bristles) if endings else None
         except ConvexroughError as error:
@@ -273,15 +263,15 @@ def write_programs(
             continue
         for ending in endings:
             assert program is not None
-            path = folder / f"{name}.{form}.{ending}"
+            file = f"{name}.{form}.{ending}"
             try:
-                program.save(path)
+                content = writers[ending](program.data)
             except InputError as error:
-                left_out[path.name], last = str(error), error
+                left_out[file], last = str(error), error
                 continue
-            written.append(path)
-            about[path.name] = program.about() | sizes(ending, path.read_bytes())
-    if not written:
+            write(file, content)
+            about[file] = program.about() | sizes(ending, content)
+    if not about:
         raise last
     index = {
         "schema": 1,
@@ -291,9 +281,8 @@ def write_programs(
         "programs": about,
         "left_out": left_out,
     }
-    with replacing(path := folder / "index.json") as temporary:
-        temporary.write_text(json.dumps(index, indent=2) + "\n", encoding="utf-8")
-    return [*written, path], index
+    write("index.json", f"{json.dumps(index, indent=2)}\n".encode())
+    return index
 
 
 def _boxes(problem: NormalProblem, own: Array) -> ConeBoxes:
