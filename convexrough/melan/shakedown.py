@@ -161,7 +161,7 @@ def shakedown(
         raise InputError("kind", found=repr(kind), expected='"exact", "elastic" or "vector"')
     Q0: Any
     if kind == "vector":
-        Q0, q = in_plane("force", force), checks.numbers("force_amplitudes", force_amplitudes)
+        Q0, q = in_plane(force), checks.numbers("force_amplitudes", force_amplitudes)
         if q.ndim != 2 or q.shape[1] != 2 or not np.isfinite(q).all():
             expected = "finite numbers of shape (m, 2)"
             raise InputError("force_amplitudes", found=f"shape {q.shape}", expected=expected)

@@ -256,12 +256,12 @@ def along(lengths: Array, vectors: Array, sizes: Array) -> Array:
     return vectors * scale[:, None]
 
 
-def in_plane(what: str, force: ArrayLike) -> Array:
+def in_plane(force: ArrayLike) -> Array:
     """(2,) a checked force, of which a number is the component along x."""
     if np.ndim(force) == 0:
-        return np.array([checks.array(what, force, length=1)[0], 0.0])
-    given = checks.array(what, force)
+        return np.array([checks.array("force", force, length=1)[0], 0.0])
+    given = checks.array("force", force)
     if given.shape != (2,):
         expected = "a number, along x, or a pair (Qx, Qy)"
-        raise InputError(what, found=f"{given.size} numbers", expected=expected)
+        raise InputError("force", found=f"{given.size} numbers", expected=expected)
     return given.copy()

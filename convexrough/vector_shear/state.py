@@ -115,7 +115,7 @@ def shear_vector(
         expected = "a solver of friction, such as FrictionNewton() or FrictionConic()"
         raise InputError("solver", found=repr(solver)[:60], expected=expected)
     friction = checks.friction(contact.scene.friction)
-    Q = in_plane("force", force)
+    Q = in_plane(force)
     size = checks.finite("force", float(np.hypot(*Q)))
     checks.bearable("force", size, friction * contact.load)
     if contact.load == 0.0:
