@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+from itertools import chain
+
 import numpy as np
 
 from convexrough.arrays import Array
 from convexrough.checks import SIZED, SMALLEST
 from convexrough.errors import InputError
-
-#: Number of asperities that `crowding` processes together. It affects speed only.
-BATCH = 256
 
 #: Number of points up to which all distances are computed. It affects speed only.
 FEW = 400
@@ -27,16 +26,13 @@ def crowding(points: Array, radii: Array) -> float:
     worst = float(((radii + radii[nearest]) / distances).max())
     if worst == 0:
         return 0.0
-    order = np.argsort(-radii)
-    for start in range(0, len(points), BATCH):
-        some = order[start : start + BATCH]
-        some = some[2.0 * radii[some] > worst * distances[some]]
-        around = tree.query_ball_point(points[some], 2.0 * radii[some] / worst)
-        for i, others in zip(some.tolist(), around, strict=True):
-            j = np.array([k for k in others if k != i], dtype=np.intp)
-            apart = np.hypot(*(points[j] - points[i]).T)
-            worst = max(worst, float(((radii[i] + radii[j]) / apart).max(initial=0.0)))
-    return worst
+    some = np.flatnonzero(2.0 * radii > worst * distances)
+    around = tree.query_ball_point(points[some], 2.0 * radii[some] / worst)
+    i = np.repeat(some, [len(others) for others in around])
+    j = np.fromiter(chain.from_iterable(around), np.intp, len(i))
+    i, j = i[i != j], j[i != j]
+    apart = np.hypot(*(points[j] - points[i]).T)
+    return max(worst, float(((radii[i] + radii[j]) / apart).max(initial=0.0)))
 
 
 def refuse_coincident(points: Array) -> None:
