@@ -52,16 +52,20 @@ Make = Callable[[], Scene]
 class Attempt:
     """One point of the diagram of time against error.
 
-    solver    : name of the method;  setting : description of the settings
-    settings  : the solver object;  influence : compliance operator; None for the cheapest
+    setting   : description of the settings;  settings : the solver object
+    influence : compliance operator; None for the cheapest
     most      : the attempt is made for at most this many asperities
     """
 
-    solver: str
     setting: str
     settings: Solver
     influence: Kind | None = None
     most: int = 10**9
+
+    @property
+    def solver(self) -> str:
+        """The name of the method."""
+        return ", ".join(filter(None, (self.settings.name, self.influence)))
 
 
 _pressed = partial(press, approach=APPROACH)
@@ -101,11 +105,6 @@ def reference(scene: Scene) -> Array:
     raise SolverError(what, solver="reference", advice=advice)
 
 
-def relative_error(loads: Array, right: Array) -> float:
-    """The error max |P - P_ref| / max P_ref of loads P (n,) [force]."""
-    return float(np.abs(loads - right).max() / right.max())
-
-
 def measure_attempt(
     family: Family, scene: Scene, attempt: Attempt, right: Array | None, patience: float
 ) -> Row:
@@ -126,7 +125,7 @@ def measure_attempt(
     problem, solution = found
     loads = np.zeros(len(scene))
     loads[problem.candidates] = solution.loads * problem.units.force  # exact, by a power of two
-    error = math.nan if right is None else relative_error(loads, right)
+    error = math.nan if right is None else float(np.abs(loads - right).max() / right.max())
     touching = int(np.count_nonzero(loads))
     return replace(row, touching=touching, iterations=solution.iterations, error=error)
 

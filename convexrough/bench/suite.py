@@ -75,22 +75,21 @@ THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "VECLIB
 
 def attempts(quick: bool) -> list[Attempt]:
     """All solvers at several tolerances; others than Newton's with and without a Newton step."""
-    found, every = [Attempt("newton", "default", Newton())], 2 if quick else 1
+    found, every = [Attempt("default", Newton())], 2 if quick else 1
     solver: Solver
     for kind, most in COUPLINGS.items():
-        label = "newton" if kind is None else f"newton, {kind}"
         for power in (2, 4, 8, 12)[::every]:
             solver = Newton(tolerance=10.0**-power)
-            found.append(Attempt(label, f"tolerance 1e-{power}", solver, kind, most))
-    for step, ending in ((True, " + Newton step"), (False, "")):
+            found.append(Attempt(f"tolerance 1e-{power}", solver, kind, most))
+    for step in (True, False):
         for power in (3, 6, 9, 11)[::every]:
-            for name, cones in (("conic", Conic), ("conic in CVXPY", ConicCVXPY)):
-                solver, setting = cones(10.0**-power, newton_step=step), f"tolerance 1e-{power}"
-                found.append(Attempt(f"{name}{ending}", setting, solver, most=PROGRAMS))
+            for cones in (Conic, ConicCVXPY):
+                solver = cones(10.0**-power, newton_step=step)
+                found.append(Attempt(f"tolerance 1e-{power}", solver, most=PROGRAMS))
         for rows, power in ((16, 4), (16, 6), (64, 6), (256, 6))[::every]:
             solver = BristleQP(rows, newton_step=step, tolerance=10.0**-power)
             setting = f"{rows} bristles, tolerance 1e-{power}"
-            found.append(Attempt(f"bristles{ending}", setting, solver, most=PROGRAMS))
+            found.append(Attempt(setting, solver, most=PROGRAMS))
     return found
 
 
