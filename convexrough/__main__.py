@@ -5,10 +5,8 @@
 
 from __future__ import annotations
 
-import _thread
 import os
 import sys
-from threading import Timer
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -38,6 +36,9 @@ def main() -> int:
 def _unraisable(unraised: Any) -> None:
     """Send an interrupt again that Python ignores, as one that arrives while it frees an object."""
     if issubclass(unraised.exc_type, KeyboardInterrupt):
+        import _thread
+        from threading import Timer
+
         Timer(0.01, _thread.interrupt_main).start()
     else:
         sys.__unraisablehook__(unraised)

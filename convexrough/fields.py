@@ -139,15 +139,20 @@ def cell_areas(points: Array) -> Array:
     >>> cr.fields.cell_areas(np.array([[0, 0], [1, 0], [0, 1], [-1, 0], [0, -1.0]]))
     array([ 1., nan, nan, nan, nan])
     """
-    from scipy.spatial import ConvexHull, QhullError, Voronoi  # takes 0.1 s to import
+    from scipy.spatial import QhullError, Voronoi  # takes 0.1 s to import
 
     areas: Array = np.full(len(points), np.nan)
     with suppress(QhullError, ValueError):  # at most three points, or all on one line
         cells = Voronoi(points)
-        for i, cell in enumerate(cells.point_region):
-            corners = cells.regions[cell]
-            if -1 not in corners:  # -1 is the corner at infinity
-                areas[i] = ConvexHull(cells.vertices[corners]).volume
+        around = [cells.regions[cell] for cell in cells.point_region]  # corners in order
+        some = [i for i, each in enumerate(around) if -1 not in each]  # -1 is at infinity
+        closed = [[*around[i], around[i][0]] for i in some]
+        counts = np.array([len(each) for each in closed])
+        x, y = (cells.vertices[np.concatenate(closed)] - np.repeat(points[some], counts, 0)).T
+        twice = np.append(x[:-1] * y[1:] - x[1:] * y[:-1], 0.0)
+        ends = np.cumsum(counts)
+        twice[ends - 1] = 0.0  # from one cell to the next
+        areas[some] = np.abs(np.add.reduceat(twice, ends - counts)) / 2.0
     return areas
 
 

@@ -35,7 +35,7 @@ from convexrough.scene.scene import Scene
 if TYPE_CHECKING:
     from convexrough.gradients.gradient import Gradient, Holding
 
-#: Where the load varies, the path is cut into about this number of cells in total.
+#: Where the load varies, the path is cut into at most about this number of cells.
 CELLS = 64
 
 
@@ -148,7 +148,7 @@ class Cycle(Table, Plottable):
         The values are nan if general steps give the results (see `order`). Where the load varies,
         they are sums over about 64 cells of the path. The relative error of their total is below
         1 % if the load falls to no less than half, some per cent if it falls to 0, and larger if
-        hardly anything slips. `asperity_loss_errors` are bounds, often ten times the errors.
+        hardly anything slips. `asperity_loss_errors` are bounds, ten to hundreds of times as large.
         """
         return self._shares[2]
 

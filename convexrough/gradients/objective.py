@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -20,7 +19,7 @@ from convexrough.friction.shear import shear
 from convexrough.friction.steady import cycle
 from convexrough.gradients.gradient import Gradient, Holding
 from convexrough.influence import Kind
-from convexrough.record import Record, singular
+from convexrough.record import Record
 from convexrough.scene.asperities import Asperities
 from convexrough.scene.base import sphere_radius
 from convexrough.scene.scene import Scene
@@ -32,9 +31,6 @@ NUMBERS = {"loss": "force", "displacement": "force", "approach": "load", "load":
 EACH, WHOLE = ("heights", "tip_radii", "positions"), ("sphere_radius", "friction")
 ELASTIC, PRESCRIBED = ("contact_modulus", "poisson_ratio"), ("load", "approach", "force")
 PARAMETERS = (*EACH, *WHOLE, *ELASTIC, *PRESCRIBED)
-
-#: A call warns if most derivatives have error bounds above this part of the largest derivative.
-POOR = 1e-3
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -120,18 +116,10 @@ class Objective(Record):
 
         parameters : (m,) in the order of `by`, in the scene's units
 
-        Warns if derivatives are known to few digits, as at a very small force. Raises InputError
-        for invalid parameters, or if there is no gradient.
+        Raises InputError for invalid parameters, or if there is no gradient.
         """
         gradient = self.gradient(parameters)
         slopes = {name: getattr(gradient, name) for name in self.by}
-        for name, each in slopes.items():
-            if each is None:  # the force of a loss
-                continue
-            errors = f"{singular(name)}_errors" if name in EACH else f"{name}_error"
-            if 0 < POOR * np.abs(each).max() < np.median(getattr(gradient, errors)) < np.inf:
-                said = f"most derivatives by {name} have error bounds above {POOR:g} of the largest"
-                warnings.warn(said, stacklevel=2)
         if "force" in slopes and gradient.maximum is not None:
             slopes["force"] = 2.0 * gradient.maximum  # the force also changes the minimum
         return gradient.value, np.concatenate([np.ravel(each) for each in slopes.values()])

@@ -46,6 +46,7 @@ def cycle_figures(cycles: Sequence[Cycle], *, loops: Sequence[Loop] | None = Non
     hysteresis loss
     """
     checks.sequence("cycles", cycles, "a list of cycles")
+    cycles = list(cycles)
     if not cycles:
         return Figures()
     contact = cycles[0].contact

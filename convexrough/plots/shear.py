@@ -35,6 +35,7 @@ def shear_figures(states: Sequence[ShearState]) -> Figures:
     stick_slip
     """
     checks.sequence("states", states, "a list of states")
+    states = list(states)
     if not states:
         return Figures()
     if not states[0].contact.loads.any():

@@ -178,10 +178,11 @@ def digest(path: Path) -> str:
 
 def read_text(path: Path) -> str:
     """The text of a UTF-8 file, with or without a byte-order mark. Raises FileError."""
-    with reading(path):
-        if path.stat().st_size > MOST_BYTES:
+    with reading(path), path.open(encoding="utf-8-sig") as file:
+        text = file.read(MOST_BYTES + 1)  # from a device there may be no end
+        if len(text) > MOST_BYTES:
             raise FileError(f"{path}: more than {MOST_BYTES / 2**20:g} MiB")
-        return path.read_text(encoding="utf-8-sig")
+        return text
 
 
 def tables_of(path: Path, text: str) -> dict[str, Any]:

@@ -170,7 +170,12 @@ class UnitNames(NamedTuple):
 
     def unit(self, kind: str) -> Unit | None:
         """The scene's unit of "length", "force", "area" or "pressure"; None if it is not named."""
-        return parsed(self.name(kind))
+        length, force = map(parsed, self)
+        if kind == "area" and length:
+            return (length**2)._replace(name=self.name(kind))
+        if kind == "pressure" and length and force:
+            return (force * length**-2)._replace(name=self.name(kind))
+        return {"length": length, "force": force}.get(kind)
 
     def name(self, kind: str) -> str:
         """The name of the unit of "length", "force", "area", "pressure", "work" or "stiffness"; ""

@@ -47,7 +47,8 @@ class VectorShearState(Table, Plottable):
     forces       : (n, 2) [force] shear forces on the asperities; their sum is `force`
     slips        : (n, 2) [length] gross slip along the forces, 0 where not sliding
     stick_radii  : (n,) [length] radii of the stick discs, 0 where sliding
-    disagreement : relative difference (2-norm) of the forces from those of `shear`
+    disagreement : relative difference (2-norm) of the forces from those of `shear`; nan if general
+        steps, which give these where order fails, do not converge
     residual     : largest relative violation of the conditions of least energy, recomputed from
         this result: `FrictionProblem.residual`
     duality_gap  : [force length] upper bound on the energy of these forces minus the least energy;
@@ -212,7 +213,10 @@ def _disagreement(forces: Array, contact: Contact, Q: Array) -> float:
     """Relative 2-norm of the forces minus those of `shear`, directed along Q; 0 if Q is 0."""
     if (size := float(np.hypot(*Q))) == 0.0:
         return 0.0
-    other = shear(contact, force=size).forces / size
+    try:
+        other = shear(contact, force=size).forces / size
+    except SolverError:
+        return np.nan
     difference = forces / size - other[:, None] * (Q / size)
     return float(np.linalg.norm(difference) / np.linalg.norm(other))
 

@@ -193,12 +193,13 @@ class Placing:
         count = np.arange(len(self.scene))
         named, others = dict[str, Indices](), dict[str, Indices]()
         for name, cells in self.table.others.items():
-            whole = np.zeros(len(cells), dtype=bool)
+            whole = np.char.isdecimal(cells.astype(str))
             if cells.dtype.kind == "f":
                 whole = (np.floor(cells) == cells) & (cells >= 0) & (cells < 2**53)
-            if not whole.all():
+            if cells.dtype.kind != "f" or not whole.all():
                 if bare(name).lower() in SURELY_INDEX and len(cells) == len(count):
-                    found = f"{cells[~whole][0]} in {self.table.rows[int(np.argmin(whole))]}"
+                    first = int(np.argmin(whole))
+                    found = f"{cells[first]} in {self.table.rows[first]}"
                     right = "whole numbers from 0 or 1; rename the column if rows are in order"
                     self.mistakes.append(f"column {name}: found {found}, expected {right}")
                 continue

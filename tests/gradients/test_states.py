@@ -594,14 +594,6 @@ def test_in_other_packages(package: str) -> None:
     np.testing.assert_allclose(squared, 2 * value * slopes, rtol=1e-14)
 
 
-def test_derivatives_known_to_few_digits_are_warned_of() -> None:
-    load = pressed("rough").load
-    given: Any = dict(scene=with_friction(paper()), of="loss", by=["heights"], load=load)
-    loss = cr.Objective(**given, force=1e-8 * FRICTION * load)
-    with pytest.warns(UserWarning, match="most derivatives by heights have error bounds"):
-        loss(loss.start)
-
-
 def test_a_force_without_use_is_refused() -> None:
     with pytest.raises(cr.InputError, match=r"force: found .*, expected none, as the load does"):
         of_loss(of="load", load=None, approach=5e-5)
