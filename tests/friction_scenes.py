@@ -8,16 +8,11 @@ import numpy as np
 from scenes import EVERY, MATERIAL, hexagonal
 
 import convexrough as cr
-from convexrough import FrictionConic, VectorShearState, shear_vector
 from convexrough.arrays import Array
 from convexrough.sphere import hertz
 
 FRICTION = 0.5
-FRACTIONS = [1e-9, 1e-6, 1e-3, 0.1, 0.35, 0.37, 0.5, 0.7, 0.9, 0.999]
-NAMES = ["paper", "rough"]
 KINDS = ["dense", "lattice"]
-VECTOR_FRACTIONS = [1e-9, 1e-3, 0.1, 0.3, 0.5, 0.8, 0.99]
-VECTOR_NAMES = ["paper", "rough", "steel", "rough, closest"]
 
 
 @cache
@@ -92,13 +87,6 @@ def around(load: float) -> cr.Contact:
 def shaded() -> cr.Scene:
     """A small low asperity between five crowded ones: pressed far, it loses load again."""
     return on_flat(ring(5), np.r_[0.05, np.ones(5)], np.r_[-0.06, np.zeros(5)])
-
-
-@cache
-def found(name: str, nu: float, fraction: float, conic: bool = False) -> VectorShearState:
-    contact = pressed(name, nu=nu)
-    solver = FrictionConic() if conic else None
-    return shear_vector(contact, force=fraction * FRICTION * contact.load, solver=solver)
 
 
 def lengths(vectors: np.ndarray) -> np.ndarray:

@@ -8,16 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from flint import arb, ctx
-from friction_scenes import (
-    FRACTIONS,
-    FRICTION,
-    KINDS,
-    NAMES,
-    SCENES,
-    in_doubt,
-    pressed,
-    with_friction,
-)
+from friction_scenes import FRICTION, KINDS, SCENES, in_doubt, pressed, with_friction
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from levels_reference import DIGITS, displaced, reference
@@ -29,6 +20,9 @@ from status_audit import ATTACKS, attack
 import convexrough as cr
 from convexrough.arithmetic.balls import Ball
 from convexrough.contact import levels_of
+
+FRACTIONS = [1e-9, 1e-6, 1e-3, 0.1, 0.35, 0.37, 0.5, 0.7, 0.9, 0.999]
+NAMES = ["paper", "rough"]
 
 #: Half a unit in the last place of the largest, and what a bound may be of it.
 ULP, BOUND = 2.0**-53, 1e-14
