@@ -33,7 +33,6 @@ from status_audit import ATTACKS, assert_honest, attack, excess
 
 import convexrough as cr
 from convexrough.arithmetic.pairs import Pair
-from convexrough.bench.scenes import scene as bench_scene
 from convexrough.contact import levels_of
 from convexrough.convex.definite import proved_sparse_margin
 from convexrough.influence.coupling import Kind, inverse_distances
@@ -492,15 +491,6 @@ def test_lattices_exclude_more_other_solutions() -> None:
             secant = problem.coefficients * (np.cbrt(Q) ** 2 - np.cbrt(loads) ** 2) / (Q - loads)
             assert np.linalg.eigvalsh(np.diag(secant) + A.matrix)[0] > 0
     assert 2 <= by_lattice < 11
-
-
-def test_eight_thousand_on_a_lattice_have_one_solution() -> None:
-    """Shells that do not overlap show it of a third as many; three times as many are too many."""
-    smaller = cr.press(bench_scene("lattice", 12.0), approach=5e-5)
-    assert smaller.certificate.scope == "global"
-    assert smaller.certificate.meaning == "the only solution"
-    larger = cr.press(bench_scene("lattice", 20.0), approach=5e-5)
-    assert larger.certificate.scope == "local"
 
 
 def test_poor_loads_of_a_prescribed_total_do_not_exclude_another_solution() -> None:
