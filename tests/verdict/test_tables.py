@@ -282,54 +282,38 @@ def test_titles_above_columns_without_names(tmp_path: Path) -> None:
 KEYED = Reading(keyed=True)  # as for the file of a scene
 
 
+WRONG_SUMMITS = [
+    ("", "empty"),
+    ("x,y\n", "rows: found none below the header"),
+    ("x,y,heigth\n0,0,0\n", "found 'heigth', expected a known column; did you mean \"height\", or "
+     'columns = {height = "heigth"} in [asperities]?'),
+    ("X-Koord. [m],Y-Koord. [m],z,R\n0,0,0,1\n", "expected a column 'x': rename one, or columns = "
+     '{x = "X-Koord.", y = "Y-Koord."} in [asperities]'),
+    ("x,height\n0,0\n", "columns: found x, height, expected a column 'y'"),
+    ("x,y,x\n0,0,0\n", "columns: found 'x' twice, expected once"),
+    ("x,y\n0,0\n1,2,3\n", "row 3: found 3 cells, expected 2, as in the header: 1,2,3"),
+    ('x,y\n0,"1\n', 'row 2: found quotes that do not end on this line: 0,"1'),
+    ("x,y\n0,1_000\n", "row 2, column y: found '1_000', expected a finite number"),
+    ("x,y,tip_radius\n0,0,1\n", "tip radii: found both"),
+    ("x,y,elevation,load,id\n0,0,1,2,3\n", "columns: found elevation, but no height, expect"),
+    ("x,y,depth\n0,0,1\n", "sphere: write depths as negative heights"),
+    ("x,y\n0,0\n", "tip radii: found neither"),
+    ("x,y,z,diameter,R\n0,0,0,2,1\n", "found neither, expected either a column tip_radius or "
+     'the key tip_radius in the scene file; not used: diameter, R; columns = {tip_radius = "R"}'),
+    ("x,y,z,temp\n0,0,0,2\n", "found neither, expected either a column tip_radius or the key "
+     'tip_radius in the scene file; not used: temp; columns = {tip_radius = "NAME"}'),
+    ("x,y\n0,0\n0,0\n", "asperities 0 and 1"),
+    *((f"x,y,{each}\n0,0,1\n", "column height: found mm, and a scene without units, expected")
+      for each in ("height_mm", "Height mm", "z in mm", "HEIGHT.mm", "height_in_mm")),
+    ("# heights x 1000\nx,y,z\n0,0,1\n", "found '# heights x 1000', expected no factor of the"),
+    *((f"{each}\n,,height,tip_radius\n0,0,1,2\n", "rows 1 and 2: found a heading o")
+      for each in ("x,y,Summit,", "X-Koordinate,Y-Koordinate,Summit,")),
+    ("# units: micrometres\nx,y,z\n0,0,1\n", "found '# units: micrometres', expected units in"),
+]  # fmt: skip
+
+
 @pytest.mark.sample(8)
-@pytest.mark.parametrize(
-    ("content", "expected"),
-    [
-        ("", "empty"),
-        ("x,y\n", "rows: found none below the header"),
-        (
-            "x,y,heigth\n0,0,0\n",
-            "found 'heigth', expected a known column; did you mean \"height\", "
-            'or columns = {height = "heigth"} in [asperities]?',
-        ),
-        (
-            "X-Koord. [m],Y-Koord. [m],z,R\n0,0,0,1\n",
-            "expected a column 'x': rename one, or columns = "
-            '{x = "X-Koord.", y = "Y-Koord."} in [asperities]',
-        ),
-        ("x,height\n0,0\n", "columns: found x, height, expected a column 'y'"),
-        ("x,y,x\n0,0,0\n", "columns: found 'x' twice, expected once"),
-        ("x,y\n0,0\n1,2,3\n", "row 3: found 3 cells, expected 2, as in the header: 1,2,3"),
-        ('x,y\n0,"1\n', 'row 2: found quotes that do not end on this line: 0,"1'),
-        ("x,y\n0,1_000\n", "row 2, column y: found '1_000', expected a finite number"),
-        ("x,y,tip_radius\n0,0,1\n", "tip radii: found both"),
-        ("x,y,elevation,load,id\n0,0,1,2,3\n", "columns: found elevation, but no height, expect"),
-        ("x,y,depth\n0,0,1\n", "sphere: write depths as negative heights"),
-        ("x,y\n0,0\n", "tip radii: found neither"),
-        (
-            "x,y,z,diameter,R\n0,0,0,2,1\n",
-            "found neither, expected either a column tip_radius or the key tip_radius in the scene "
-            'file; not used: diameter, R; columns = {tip_radius = "R"} in [asperities]',
-        ),
-        (
-            "x,y,z,temp\n0,0,0,2\n",
-            "found neither, expected either a column tip_radius or the key tip_ra"
-            'dius in the scene file; not used: temp; columns = {tip_radius = "NAME"}',
-        ),
-        ("x,y\n0,0\n0,0\n", "asperities 0 and 1"),
-        *(
-            (f"x,y,{each}\n0,0,1\n", "column height: found mm, and a scene without units, expected")
-            for each in ("height_mm", "Height mm", "z in mm", "HEIGHT.mm", "height_in_mm")
-        ),
-        ("# heights x 1000\nx,y,z\n0,0,1\n", "found '# heights x 1000', expected no factor of the"),
-        *(
-            (f"{each}\n,,height,tip_radius\n0,0,1,2\n", "rows 1 and 2: found a heading o")
-            for each in ("x,y,Summit,", "X-Koordinate,Y-Koordinate,Summit,")
-        ),
-        ("# units: micrometres\nx,y,z\n0,0,1\n", "found '# units: micrometres', expected units in"),
-    ],
-)
+@pytest.mark.parametrize(("content", "expected"), WRONG_SUMMITS)
 def test_wrong_summits(tmp_path: Path, content: str, expected: str) -> None:
     path = tmp_path / put(tmp_path, content)
     with pytest.raises(cr.ConvexroughError) as caught:
