@@ -7,21 +7,11 @@ from typing import Any, Literal
 
 import numpy as np
 import pytest
+import scenes
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from multiprecision import off
 from numpy.testing import assert_allclose
-from scenes import (
-    CASES,
-    EVERY,
-    NAMED,
-    hexagonal,
-    operators,
-    prescribed,
-    random_cases,
-    reference,
-    scaled,
-)
 from status_audit import assert_honest
 
 import convexrough as cr
@@ -39,13 +29,13 @@ LOOSE = {"dense": 1e4, "lattice": 3e4, "scattered": 3e4}
 
 @pytest.mark.sample(9)
 @pytest.mark.parametrize("control", ["approach", "load"])
-@pytest.mark.parametrize(("name", "kind"), CASES)
+@pytest.mark.parametrize(("name", "kind"), scenes.CASES)
 def test_fifty_digits(name: str, kind: Kind, control: str) -> None:
     """Loads and gaps against a proved multiprecision solution, and the bounds against the truth."""
-    scene, approach = EVERY[name]
-    given = prescribed(scene, approach, control)
+    scene, approach = scenes.EVERY[name]
+    given = scenes.prescribed(scene, approach, control)
     contact = cr.press(scene, **given, influence=kind)
-    certificate, exact = contact.certificate, reference(scene, **given)
+    certificate, exact = contact.certificate, scenes.reference(scene, **given)
     assert contact.influence == kind
     assert (certificate.scope, certificate.all_proved) == ("global", True)
     assert_honest(certificate, contact.loads, exact)
@@ -66,11 +56,11 @@ def test_fifty_digits(name: str, kind: Kind, control: str) -> None:
 
 
 @pytest.mark.sample(3)
-@pytest.mark.parametrize("name", NAMED)
+@pytest.mark.parametrize("name", scenes.NAMED)
 def test_statuses_do_not_depend_on_the_operator(name: str) -> None:
     """Nor do loads, to within what is proved of each, whichever operator found them."""
-    scene, approach = NAMED[name]
-    kinds = operators(scene)
+    scene, approach = scenes.NAMED[name]
+    kinds = scenes.operators(scene)
     first, *others = (cr.press(scene, approach=approach, influence=kind) for kind in kinds)
     for other in others:
         again = cr.certify(scene, other.loads, approach=approach, influence=other.influence)
@@ -89,13 +79,13 @@ def test_statuses_do_not_depend_on_the_operator(name: str) -> None:
 
 
 @settings(max_examples=15, deadline=None)
-@given(random_cases(), st.floats(-3, 3), st.floats(-3, 3))
+@given(scenes.random_cases(), st.floats(-3, 3), st.floats(-3, 3))
 def test_units_do_not_matter(sampled: Case, length: float, force: float) -> None:
     """Lengths times lambda and moduli times mu: loads times lambda^2 mu, the same statuses."""
     scene, approach, kind = sampled
     lam, mu = 10**length, 10**force
     first = cr.press(scene, approach=approach)
-    second = cr.press(scaled(scene, lam, mu), approach=approach * lam, influence=kind)
+    second = cr.press(scenes.scaled(scene, lam, mu), approach=approach * lam, influence=kind)
     top = first.loads.max()
     assert_allclose(second.loads / (lam**2 * mu), first.loads, rtol=1e-11, atol=1e-12 * top)
     sure = (first.status != "undecided") & (second.status != "undecided")
@@ -103,7 +93,7 @@ def test_units_do_not_matter(sampled: Case, length: float, force: float) -> None
 
 
 @settings(max_examples=15, deadline=None)
-@given(random_cases(), st.randoms(use_true_random=False), st.floats(0, 6.28))
+@given(scenes.random_cases(), st.randoms(use_true_random=False), st.floats(0, 6.28))
 def test_order_and_orientation_do_not_matter(sampled: Case, random: object, angle: float) -> None:
     scene, approach, kind = sampled
     a = scene.asperities
@@ -117,10 +107,10 @@ def test_order_and_orientation_do_not_matter(sampled: Case, random: object, angl
     assert_allclose(second.loads, first.loads[order], rtol=1e-10, atol=1e-12 * top)
 
 
-@pytest.mark.parametrize("influence", operators(NAMED["paper"][0]))
+@pytest.mark.parametrize("influence", scenes.operators(scenes.NAMED["paper"][0]))
 def test_a_solver_that_stops_says_what_where_and_what_to_try(influence: Any) -> None:
     """Its last loads come in the scene's units and order, and are a start for the next attempt."""
-    (scene, approach), hasty = NAMED["rough"], cr.solvers.Newton(max_iterations=2)
+    (scene, approach), hasty = scenes.NAMED["rough"], cr.solvers.Newton(max_iterations=2)
     with pytest.raises(cr.SolverError) as caught:
         cr.press(scene, approach=approach, solver=hasty, influence=influence)
     error = caught.value
@@ -139,7 +129,7 @@ def test_a_solver_that_stops_says_what_where_and_what_to_try(influence: Any) -> 
 
 @pytest.mark.parametrize("tolerance", [0.0, 1e-6])
 def test_steps_are_too_few_only_if_the_residual_is_too_large(tolerance: float) -> None:
-    scene, approach = NAMED["rough"]
+    scene, approach = scenes.NAMED["rough"]
     for most in range(1, 9):
         hasty = cr.solvers.Newton(tolerance=tolerance, max_iterations=most)
         try:
@@ -151,7 +141,7 @@ def test_steps_are_too_few_only_if_the_residual_is_too_large(tolerance: float) -
 
 def results(geometry: Literal["summit", "closest"]) -> Iterator[Any]:
     """One result of each kind, of an array of which all asperities could touch."""
-    scene = replace(hexagonal(height_std=2e-7, seed=1), friction=0.5, geometry=geometry)
+    scene = replace(scenes.hexagonal(height_std=2e-7, seed=1), friction=0.5, geometry=geometry)
     contact = cr.press(scene, approach=5.5e-5)
     load, force, n = contact.load, 0.2 * contact.load, len(scene)
     weights = np.arange(n) - 0.4 * n

@@ -14,23 +14,11 @@ from unittest.mock import Mock
 import multiprecision
 import numpy as np
 import pytest
+import scenes
 from flint import arb, ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from multiprecision import exact, inverse_sum, inverse_sums, middle, of_scene, pulled, quotient
-from scenes import (
-    LATTICES,
-    LAYOUTS,
-    MATERIAL,
-    jittered,
-    lattice_operator,
-    lattice_patch,
-    loadings,
-    on_sphere,
-    paper,
-    rough,
-    turned,
-)
 
 import convexrough as cr
 from convexrough.arithmetic.balls import Ball
@@ -64,9 +52,9 @@ EVEN = ("disc", "jittered")
 def operator(kind: str, layout: str, rng: np.random.Generator, count: int = 0) -> Any:
     if kind == "lattice":
         count = count or int(rng.choice([40, 500, 1000]))
-        points = lattice_patch(turned(LATTICES[layout], 0.3), count)
-        return lattice_operator(points + rng.choice([0.0, 300.0, 1e4]), SCALE)
-    points = LAYOUTS[layout](rng)
+        points = scenes.lattice_patch(scenes.turned(scenes.LATTICES[layout], 0.3), count)
+        return scenes.lattice_operator(points + rng.choice([0.0, 300.0, 1e4]), SCALE)
+    points = scenes.LAYOUTS[layout](rng)
     if kind == "dense":  # more than 64 points are summed in blocks
         return DenseInfluence.assemble(rng.permutation(points)[: count or 500], SCALE)
     return ScatteredInfluence(points[:count] if count else points, SCALE)
@@ -74,8 +62,8 @@ def operator(kind: str, layout: str, rng: np.random.Generator, count: int = 0) -
 
 CASES = [
     *(("dense", layout) for layout in ("disc", "coincident")),
-    *(("lattice", basis) for basis in LATTICES),
-    *(("scattered", layout) for layout in LAYOUTS),
+    *(("lattice", basis) for basis in scenes.LATTICES),
+    *(("scattered", layout) for layout in scenes.LAYOUTS),
 ]
 each_operator = pytest.mark.parametrize(("kind", "layout"), CASES)
 
@@ -87,7 +75,7 @@ def test_products_and_sums(kind: str, layout: str, seed: int) -> None:
     """Within their bounds, which are not absurd."""
     rng = np.random.default_rng(seed)
     A: Influence = operator(kind, layout, rng)
-    rows, loads = rng.integers(0, len(A), 30), loadings(len(A), rng)
+    rows, loads = rng.integers(0, len(A), 30), scenes.loadings(len(A), rng)
     shift = np.abs(A.points.mean(axis=0)).max() if kind == "lattice" else 0.0
     good = {"dense": 1e-14, "lattice": max(1e-14, 3e-16 * shift), "scattered": 1e-13}[kind]
     sums = (each.T for each in inverse_sums(A.points[rows], A.points, loads.T, SCALE))
@@ -206,7 +194,7 @@ def at_line(k: int, call: Callable[[], Any], other: Callable[[], Any]) -> tuple[
 def interrupted(points: Array, ask: Any, own: Any, other: Any, first: Any) -> Iterator[Any]:
     """What `ask` returns for `own` if another thread asks for `other` at any moment."""
     for k in itertools.count():
-        A = lattice_operator(points, SCALE)
+        A = scenes.lattice_operator(points, SCALE)
         ask(A, first)
         found, reached = at_line(k, partial(ask, A, own), partial(ask, A, other))
         yield found
@@ -215,15 +203,15 @@ def interrupted(points: Array, ask: Any, own: Any, other: Any, first: Any) -> It
 
 
 def test_threads_that_restrict_one_operator_at_once_get_their_own() -> None:
-    points, own, other = lattice_patch(np.eye(2), 60), np.arange(40), np.arange(20, 60)
+    points, own, other = scenes.lattice_patch(np.eye(2), 60), np.arange(40), np.arange(20, 60)
     for part in interrupted(points, LatticeInfluence.restricted, own, other, first=other):
         assert (part.points == points[own]).all()
 
 
 def test_threads_whose_loads_reach_unequally_far_get_their_own_sums() -> None:
-    points = lattice_patch(turned(LATTICES["square"], 0.3), 60)
+    points = scenes.lattice_patch(scenes.turned(scenes.LATTICES["square"], 0.3), 60)
     near, everywhere = Pair.exact(np.eye(60)[0]), Pair.exact(np.ones(60))
-    true = lattice_operator(points, SCALE).sums(near)
+    true = scenes.lattice_operator(points, SCALE).sums(near)
     for found in interrupted(points, LatticeInfluence.sums, near, everywhere, first=near):
         assert (np.abs((found - true).value) <= found.radius + true.radius).all()
 
@@ -246,10 +234,10 @@ def test_slopes(kind: str, layout: str, seed: int) -> None:
     A = operator(kind, layout, rng)
     rows = rng.integers(0, len(A), 10)
     shift = np.abs(A.points.mean(axis=0)).max() if kind == "lattice" else 1.0
-    for load in loadings(len(A), rng):
+    for load in scenes.loadings(len(A), rng):
         off, errors = off_and_errors(A, load, rows)
         top = (SCALE * A.falloff(np.abs(load), 2)).max()
-        assert off.max() <= 1e-10 * top or layout not in (*EVEN, *LATTICES)
+        assert off.max() <= 1e-10 * top or layout not in (*EVEN, *scenes.LATTICES)
         limit = {"lattice": 1e-11 * max(1.0, 1e-3 * shift), "dense": 1e-12}.get(kind, np.inf)
         assert errors.max() <= limit * top or layout == "coincident"
 
@@ -261,7 +249,7 @@ def test_slopes_on_lattices_that_are_made(family: str, most: float) -> None:
     array = getattr(cr.Asperities, family)(spacing=1.0, tip_radius=1.0, within=20.0)
     scene = cr.Scene(1e3, array, cr.Material(1.0, 0.3), geometry="summit")
     A = NormalProblem.assemble(scene, approach=1.0, influence="lattice").influence
-    for load in loadings(len(A), rng):
+    for load in scenes.loadings(len(A), rng):
         _, errors = off_and_errors(A, load, rng.integers(0, len(A), 3))
         assert errors.max() <= most * (A.scale * A.falloff(np.abs(load), 2)).max()
 
@@ -306,9 +294,9 @@ def test_many_points_of_a_lattice_are_exactly_on_their_sites(family: str, geomet
             assert abs(float(off)) <= found.radius[i] <= 1e-21 * found.mid.high[i]
 
 
-@pytest.mark.parametrize("name", LATTICES)
+@pytest.mark.parametrize("name", scenes.LATTICES)
 def test_what_is_nearly_a_lattice_is_none(name: str) -> None:
-    points = lattice_patch(np.array(LATTICES[name]), 500)
+    points = scenes.lattice_patch(np.array(scenes.LATTICES[name]), 500)
     assert Lattice.through(points) is not None
     noise = 1e-9 * np.random.default_rng(2).standard_normal(points.shape)
     for moved in (slice(None), 0, 100, 499):
@@ -323,7 +311,7 @@ def test_far_from_the_origin_rounded_points_are_no_lattice() -> None:
     square = cr.Asperities.square(spacing=1.0, tip_radius=1.0, within=14).positions
     points = square @ np.array([[0.8, 0.6], [-0.6, 0.8]]) + 3e6 * np.array([0.6, 0.8])
     tips = 10 ** np.random.default_rng(0).uniform(-1.5, 1.5, len(points))
-    scene = cr.Scene(np.inf, cr.Asperities(points, tips), MATERIAL, geometry="summit")
+    scene = cr.Scene(np.inf, cr.Asperities(points, tips), scenes.MATERIAL, geometry="summit")
     contact = cr.press(scene, approach=0.002)
     assert (contact.influence, contact.certificate.scope) == ("dense", "global")
 
@@ -333,13 +321,15 @@ def test_far_from_the_origin_rounded_points_are_no_lattice() -> None:
 def test_shells_do_not_overlap(seed: int) -> None:
     """The premise of the shell lemma: s_i + s_j <= r_ij for all pairs, touching or not."""
     rng = np.random.default_rng(seed)
-    points = lattice_patch(turned(LATTICES[sorted(LATTICES)[seed % 4]], 0.2), 300)
+    points = scenes.lattice_patch(
+        scenes.turned(scenes.LATTICES[sorted(scenes.LATTICES)[seed % 4]], 0.2), 300
+    )
     points = rng.permutation(points)[:120] + rng.choice([0.0, 1e4])
     touching = rng.random(120) < rng.random() ** 3
     radii = rng.lognormal(0, rng.choice([0.0, 0.0, 3.0]), 120) * touching
     inverse, share = inverse_distances(points, points), rng.choice([0.0, rng.random(), 1.0])
     dense, mesh = DenseInfluence.assemble(points, SCALE), ScatteredInfluence(points, SCALE)
-    for A in (lattice_operator(points, SCALE), mesh, dense):
+    for A in (scenes.lattice_operator(points, SCALE), mesh, dense):
         with np.errstate(divide="ignore"):
             fitted, halves = SCALE / fitted_shells(A, radii, share), SCALE / shells(A)
         for s in (fitted, halves):
@@ -350,8 +340,8 @@ def test_shells_do_not_overlap(seed: int) -> None:
 def test_the_most_crowded_pair(basis: str) -> None:
     """Also if it is not one of nearest neighbours, at the ends of rows, and if none touches."""
     rng = np.random.default_rng(1)
-    points = np.indices((6, 7)).reshape(2, -1).T @ np.array(LATTICES[basis])
-    A, mesh = lattice_operator(points, SCALE), ScatteredInfluence(points, SCALE)
+    points = np.indices((6, 7)).reshape(2, -1).T @ np.array(scenes.LATTICES[basis])
+    A, mesh = scenes.lattice_operator(points, SCALE), ScatteredInfluence(points, SCALE)
     dense = DenseInfluence.assemble(points, SCALE)
     for coverage in np.linspace(0.0, 0.2, 150):
         radii = rng.choice([1.0, 0.2], 42) * (rng.random(42) < coverage)
@@ -385,7 +375,7 @@ def test_gaps_on_a_lattice(geometry: Any, R: Any, shift: float | None) -> None:
     if shift is None:  # exactly on their sites
         lattice, shift = cr.Asperities.square(spacing=2.0**-9, tip_radius=0.02, within=0.01), 0.0
     else:
-        lattice = paper().asperities
+        lattice = scenes.paper().asperities
     heights = 1e-6 * np.random.default_rng(4).standard_normal(len(lattice))
     asperities = cr.Asperities(lattice.positions + shift, 0.02, heights)
     scene = cr.Scene(R, asperities, cr.Material(0.7, 0.3), geometry=geometry)
@@ -458,7 +448,7 @@ def test_sums_are_known(
 
 def test_sums_where_points_are_pairs() -> None:
     """Of the closest-point geometry as many digits as of summits, and of the true points."""
-    scene = rough("closest")
+    scene = scenes.rough("closest")
     loads = Pair.exact(np.random.default_rng(4).random(len(scene)))
     found = couple(scene, np.arange(len(scene)), SCALE).sums(loads)
     ctx.dps = 60
@@ -502,7 +492,7 @@ def test_upper_bounds_on_sums() -> None:
 
 def test_point_error_is_counted() -> None:
     rng = np.random.default_rng(8)
-    points = jittered(rng)
+    points = scenes.jittered(rng)
     moved = points + rng.choice([-1e-13, 1e-13], points.shape)
     operator = ScatteredInfluence(points, SCALE, 1e-13)
     loads = rng.random(len(points))
@@ -526,13 +516,13 @@ def test_presses_of_points_in_distant_clusters() -> None:
     patch = patch + rng.uniform(-0.3, 0.3, patch.shape)
     far = np.array([[2e4, 1e4]])
     for points in (np.vstack((patch, patch + far)), np.vstack((patch, far))):
-        scene = on_sphere(points, 10.0, radius=np.inf)
+        scene = scenes.on_sphere(points, 10.0, radius=np.inf)
         assert cr.press(scene, approach=0.02, influence="scattered").iterations <= 8
 
 
 def test_an_interrupted_mesh_is_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
     """Else the operator would fall back to a matrix, which may not fit in memory."""
-    operator = ScatteredInfluence(jittered(np.random.default_rng(2)), SCALE)
+    operator = ScatteredInfluence(scenes.jittered(np.random.default_rng(2)), SCALE)
     with monkeypatch.context() as patch:
         patch.setattr(Product, "assemble", Mock(side_effect=KeyboardInterrupt))
         with pytest.raises(KeyboardInterrupt):

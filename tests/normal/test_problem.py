@@ -6,20 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scenes
 from flint import arb, ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from scenes import (
-    MATERIAL,
-    OPERATORS,
-    hexagonal,
-    on_lattice,
-    on_sphere,
-    paper,
-    random_cases,
-    scattered,
-)
 
 import convexrough as cr
 from convexrough.arithmetic.balls import Ball
@@ -43,14 +34,14 @@ Case = tuple[cr.Scene, float, Kind]
 
 def test_screening_drops_only_those_that_cannot_touch() -> None:
     # The ring at 4 spacings lies at D = 0 to rounding, and is kept.
-    assert len(NormalProblem.assemble(paper(), approach=5e-5)) == 61
-    problem = NormalProblem.assemble(paper(), approach=1e-5)
-    inside = paper().asperities.distances < np.sqrt(2e-5)
+    assert len(NormalProblem.assemble(scenes.paper(), approach=5e-5)) == 61
+    problem = NormalProblem.assemble(scenes.paper(), approach=1e-5)
+    inside = scenes.paper().asperities.distances < np.sqrt(2e-5)
     assert set(problem.candidates) == set(np.flatnonzero(inside))
 
 
 @settings(max_examples=20, deadline=None)
-@given(random_cases(crowding=1.5), st.integers(0, 2**32 - 1))
+@given(scenes.random_cases(crowding=1.5), st.integers(0, 2**32 - 1))
 def test_the_approach_bound_holds_for_any_weights(sampled: Case, seed: int) -> None:
     """No solution carries more than an asperity would alone; no load, a higher approach."""
     scene, approach, kind = sampled
@@ -73,14 +64,14 @@ def test_a_close_pair_does_not_make_candidates_of_all(kind: Kind) -> None:
     regular = cr.Asperities.square(spacing=0.0025, tip_radius=0.002, within=0.04).positions
     points = np.vstack((regular, regular[np.argmin(np.hypot(*regular.T))] + [1e-9, 0.0]))
     bounds = [
-        highest_approach(cr.Scene(1.0, cr.Asperities(each, 0.002), MATERIAL), 1e-7, kind)
+        highest_approach(cr.Scene(1.0, cr.Asperities(each, 0.002), scenes.MATERIAL), 1e-7, kind)
         for each in (regular, points)
     ]
     assert bounds[1] <= 1.05 * bounds[0]
 
 
 @settings(max_examples=8, deadline=None)
-@given(random_cases(crowding=0.99), st.integers(0, 2**32 - 1), st.floats(-6, 3))
+@given(scenes.random_cases(crowding=0.99), st.integers(0, 2**32 - 1), st.floats(-6, 3))
 def test_newton_converges_from_any_start(sampled: Case, seed: int, size: float) -> None:
     """On every convex scene, to the same answer."""
     scene, approach, kind = sampled
@@ -96,7 +87,7 @@ def test_newton_converges_from_any_start(sampled: Case, seed: int, size: float) 
 
 
 #: Dense alone where the points are scattered; on a lattice, every operator.
-CROWDED = [(scattered, "dense"), *((on_lattice, kind) for kind in OPERATORS)]
+CROWDED = [(scenes.scattered, "dense"), *((scenes.on_lattice, kind) for kind in scenes.OPERATORS)]
 
 
 @pytest.mark.parametrize(("make", "kind"), CROWDED)
@@ -120,7 +111,7 @@ def test_nothing_where_the_smooth_sphere_would_touch(prescribed: dict[str, Any])
     """Newton's method starts somewhere wherever there is an answer."""
     ring = np.exp(2j * np.pi * np.arange(6) / 6)
     positions = 0.01 * np.column_stack((ring.real, ring.imag))
-    assert cr.press(on_sphere(positions, heights=6e-5), **prescribed).certificate.all_proved
+    assert cr.press(scenes.on_sphere(positions, heights=6e-5), **prescribed).certificate.all_proved
 
 
 @pytest.mark.sample(3)
@@ -139,13 +130,13 @@ def test_the_bound_is_above_the_approach(rough: dict[str, Any], load: float) -> 
     tip = largest_tip_radius(0.02, rough.get("tip_radius_cv", 0.0))
     height = CUT_DEVIATIONS * rough.get("height_std", 0.0)
     highest = dict(sphere_radius=1.0, tip_radius=tip, height=height, geometry="summit")
-    scene_within = partial(hexagonal, 0.0025, 0.02, **rough)
+    scene_within = partial(scenes.hexagonal, 0.0025, 0.02, **rough)
     scene, bound = all_that_could_touch(scene_within, partial(reach, **highest), load)
     assert cr.press(scene, load=load).certificate.approach <= bound * (1 + 1e-12)
 
 
 def test_bounds_cover_all_loads_within_an_uncertain_total() -> None:
-    pair = on_sphere([[-1e-3, 0.0], [1e-3, 0.0]])  # alike: the loads only scale
+    pair = scenes.on_sphere([[-1e-3, 0.0], [1e-3, 0.0]])  # alike: the loads only scale
     problem = NormalProblem.assemble(pair, load=1e-8)
     total: Any = problem.load
     state = refined_loads(problem, Newton().solve(problem).loads)
@@ -191,7 +182,7 @@ def test_contact_points_too_near_to_each_other(exponent: int) -> None:
         positions = HEXAGON * 1e-30
         asperities = cr.Asperities(positions, 10.0 ** min(-40 - exponent, 59))
         with pytest.raises(cr.InputError, match=r"at a distance of .* choose other units"):
-            cr.Scene(1e-10, asperities, MATERIAL, geometry="closest")
+            cr.Scene(1e-10, asperities, scenes.MATERIAL, geometry="closest")
 
 
 @pytest.mark.sample(1)
