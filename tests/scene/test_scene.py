@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from scenes import MATERIAL, paper
 
 import convexrough as cr
-from convexrough.normal.problem import NormalProblem
 from convexrough.scene.asperities import CUT_DEVIATIONS, largest_tip_radius
 from convexrough.scene.scene import reach
 from convexrough.sphere import mindlin
@@ -78,31 +77,7 @@ def test_random_heights_and_radii() -> None:
     assert np.abs(both.heights).max() <= CUT_DEVIATIONS * 0.1
 
 
-INF = float("inf")
-GEOMETRIES = ("summit", "closest")
-
-
-@pytest.mark.sample(2)
-@pytest.mark.parametrize("within", [0.03, 0.12])  # by one start of Newton's method and the other
-@pytest.mark.parametrize("control", [{"load": 2e-6}, {"approach": 2e-6}, {"approach": -5e-7}])
-def test_many_under_a_flat_base(within: float, control: Any) -> None:
-    regular = cr.Asperities.square(spacing=0.0035, tip_radius=0.02, within=within)
-    rough = regular.roughened(height_std=1e-6, tip_radius_cv=0.1, seed=2)
-    scene = cr.Scene(INF, rough, MATERIAL, friction=0.4, geometry="summit")
-    contact = cr.press(scene, **control)
-    assert contact.certificate.scope == "global"
-    assert not (contact.status == "undecided").any()
-    assert contact.certificate.load_error <= 1e-12 * contact.loads.max()
-    shallow = contact.loads[rough.heights < -contact.approach]
-    assert (shallow == 0).all()
-    if "load" in control:
-        problem = NormalProblem.assemble(scene, load=contact.load)
-        assert contact.approach <= problem.approach_bound * problem.units.length
-    state = cr.shear(contact, force=0.1 * contact.load)
-    assert state.certificate.scope == "global"
-
-
-@pytest.mark.parametrize("geometry", GEOMETRIES)
+@pytest.mark.parametrize("geometry", ["summit", "closest"])
 def test_reach(geometry: Any) -> None:
     """No asperity beyond it could touch, along the axis where the base bends away least."""
     given: Any = dict(tip_radius=0.1, height=1e-5, geometry=geometry)
@@ -111,5 +86,5 @@ def test_reach(geometry: Any) -> None:
         asperity = cr.Asperities([[0.0, edge * factor]], 0.1, 1e-5)
         scene = cr.Scene((0.5, 2.0), asperity, MATERIAL, geometry=geometry)
         assert np.sign(1e-4 + scene.offsets[0]) == sign
-    assert reach(1e-4, sphere_radius=INF, **given) == INF
-    assert reach(-1e-4, sphere_radius=(1.0, INF), **given) == 0
+    assert reach(1e-4, sphere_radius=np.inf, **given) == np.inf
+    assert reach(-1e-4, sphere_radius=(1.0, np.inf), **given) == 0

@@ -158,6 +158,7 @@ LARGE = {
     "screened": finer(6, within=0.02, height_std=1e-7, seed=4),
     "sparse": sparse(finer(7, height_std=1e-7, seed=4)),
     "scattered": scattered(finer(6, height_std=1e-6, seed=2)),
+    "flat": replace(edited(finer(6, height_std=1e-6, seed=2), raised=-5e-5), sphere_radius=np.inf),
 }
 
 
