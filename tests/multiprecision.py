@@ -307,16 +307,11 @@ def slide(f: arb, nu: arb, full: Any, held: Any) -> Friction:
 
 def of_scene(scene: Any) -> tuple[Balls, Balls, Balls]:
     """As `assemble`; the sphere has one radius, or one along x and one along y, and inf is flat."""
-    R, asperities = scene.sphere_radius, scene.asperities
+    R, a, modulus = scene.sphere_radius, scene.asperities, scene.material.contact_modulus
     radii = R if isinstance(R, tuple) else (R, R)
-    return assemble(
-        exact(asperities.positions),
-        exact(asperities.tip_radii),
-        exact(asperities.heights),
-        np.array([ZERO if inf == each else 1 / arb(float(each)) for each in radii]),
-        arb(float(scene.material.contact_modulus)),
-        scene.geometry,
-    )
+    bends = np.array([ZERO if inf == each else 1 / arb(float(each)) for each in radii])
+    parts = map(exact, (a.positions, a.tip_radii, a.heights))
+    return assemble(*parts, bends, arb(float(modulus)), scene.geometry)
 
 
 def assemble(
@@ -434,7 +429,13 @@ def solve_vectors(
         problem, x = _problem(scene, loads, force, start, displacement)
         size = max(float(abs(value)) for value in x)
         x = newton(problem, x, tolerance=arb(size) * arb(10) ** (-digits - GUARD_DIGITS // 2))
-        return _vector_state(problem, prove(problem, x, radius=arb(size) * arb(10) ** (-digits)))
+        x = prove(problem, x, radius=arb(size) * arb(10) ** (-digits))
+        eta = x[:-2].reshape(-1, 2)
+        lengths = np.sqrt((eta * eta).sum(axis=1))
+        sliding = lengths > problem.thresholds
+        beyond = 1 - problem.thresholds / lengths
+        slips = np.where(sliding[:, None], beyond[:, None] * eta, ZERO)
+        return VectorReference(problem.forces(x)[0], slips, x[-2:], sliding.tolist())
 
 
 def _problem(
@@ -479,15 +480,6 @@ def tangential_kernel(points: Balls, influence: Balls, bias: Any) -> Balls:
     along = 2 * bias * d[..., None] * d[..., None, :] / squares[..., None, None]
     blocks = influence[..., None, None] * (along + (1 - bias) * exact(np.eye(2)))
     return blocks.transpose(0, 2, 1, 3).reshape(2 * len(points), -1)
-
-
-def _vector_state(problem: VectorMap, x: Balls) -> VectorReference:
-    eta = x[:-2].reshape(-1, 2)
-    lengths = np.sqrt((eta * eta).sum(axis=1))
-    sliding = lengths > problem.thresholds
-    beyond = 1 - problem.thresholds / lengths
-    slips = np.where(sliding[:, None], beyond[:, None] * eta, arb(0))
-    return VectorReference(problem.forces(x)[0], slips, x[-2:], sliding.tolist())
 
 
 # What a proof file claims; nothing here knows of the checker.
