@@ -140,7 +140,6 @@ def _forked(folder: Path, arguments: list[str], limit: int | None) -> int:
 
 
 def contents(folder: Path) -> Files:
-    """All files of a folder, by name."""
     return {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
 
 

@@ -36,7 +36,6 @@ def digits(ball: arb) -> str:
 
 
 def answer(case: dict[str, Any]) -> dict[str, Any]:
-    """What is stored as the answer of a case."""
     scene = cases.scene_of(case)
     contact = cr.press(scene, **case["prescribed"])
     full = solve_exactly(scene, **case["prescribed"], start=contact.loads, digits=DIGITS)

@@ -332,7 +332,6 @@ def _with_poisson(contact: cr.Contact, nu: float) -> cr.Contact:
 
 
 def report(tally: Tally) -> str:
-    """Counts of statuses."""
     beyond = f"{tally.unsolved} beyond the oracle, {tally.unsolved_vectors} of the vector states"
     lines = [f"{tally.scenes:,} scenes, {tally.refused} refused, {beyond}"]
     for key, (statuses, undecided) in sorted(tally.statuses.items()):

@@ -176,7 +176,6 @@ PATHS = {
 
 
 def assert_path(gradient: cr.Gradient, contact: cr.Contact, P: Any, Q: Any, value: Any) -> None:
-    """Every derivative of a path against differences of it."""
     P, Q = ([Fraction(float(each)) for each in values] for values in (P, Q))
     setup = Setup.of(contact, "load")
     judge = Judge(setup, lambda there, _: (value(there, P, Q), None))

@@ -65,8 +65,6 @@ def test_states_are_those_of_shear_and_cycle(contact: cr.Contact, page: str) -> 
 
 
 class Opened(NamedTuple):
-    """A page in the browser."""
-
     page: Page
 
     def text(self, name: str) -> str:

@@ -365,7 +365,6 @@ def test_onset_is_the_least_force_at_which_the_fraction_slides() -> None:
 
 
 def identity(contents: dict[str, Any], folder: Path = Path()) -> Any:
-    """The hash of a sweep."""
     return plan_of(contents, folder / "sweep.toml").manifest["sweep"]
 
 

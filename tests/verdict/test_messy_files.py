@@ -127,14 +127,12 @@ def nodes(case: Case) -> str:
 
 
 def abaqus(case: Case) -> str:
-    """A report of fields."""
     title = "*** \nField Output Report, written Mon May  4\n\nSource 1\n---------\n\n"
     title += 'Output sorted by column "Node Label".\n\n  Node Label      x       y      load\n'
     return f"{title}          @Loc 1  @Loc 1  @Loc 1\n{'-' * 60}\n{nodes(case)}"
 
 
 def ansys(case: Case) -> str:
-    """A listing of two pages."""
     head = "\n PRINT F NODAL SOLUTION PER NODE\n\n  LOAD STEP=     1  SUBSTEP=     1\n"
     head += "   TIME=    1.0000      LOAD CASE=   0\n\n    NODE    x    y    load\n"
     rows = nodes(case).splitlines(True)
