@@ -25,6 +25,7 @@ P = LARGEST["paper"]
 SWING = [0.5 * P, -0.5 * P]
 HERTZ = cr.smooth(PAPER, load=CONTACT.load)
 OTHER = cr.press(cr.Scene(1.0, cr.Asperities([[0.0, 0.0]], 1.0), MATERIAL), approach=1e-4)
+ABOVE = cr.gallery.case("convexity-end-above")
 TWO = pd.DataFrame({"x": [0.0, 1.0], "y": 0.0, "z": 0.0})
 
 
@@ -123,6 +124,8 @@ BAD = [
      "at constant approach f P may fall below"),
     (lambda: cr.cycle(TOGETHER, maximum=FRICTION * TOGETHER.load).gradient(),
      "several asperities slide last"),
+    (lambda: cr.Objective(scene=PAPER, of="load", by=["heights"], approach=5e-5, force=1e-8),
+     "force: found .*, expected none, as the load does"),
     (lambda: cr.onset_gradient(TOGETHER, 1),
      "asperity: found 1, which slides last, together with"),
     # The smooth sphere.
@@ -197,6 +200,7 @@ BAD = [
     (lambda: CONTACT.plot("load"), "axes: found type str, expected Axes"),
     (lambda: CONTACT.columns("loads", "load"), "columns: found 'load', expected some of stat"),
     (lambda: cr.testing.assert_agree(CONTACT, cr.shear(CONTACT, force=0)), "type ShearState, exp"),
+    (lambda: cr.program(ABOVE.scene, **ABOVE.control), "cones: asperities too dense for a conv"),
     (lambda: (p := cr.program(PAPER, load=1e-7)).loads(p.data.linear * np.nan),
      r"values\[0\]: found nan"),
 ]  # fmt: skip

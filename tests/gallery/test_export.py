@@ -197,12 +197,6 @@ def test_files_are_solved_by_others(form: Any, ending: str, control: str, tmp_pa
     assert made.energy(objective) == pytest.approx(exact, rel=1e-6 + made.load_error_estimate)
 
 
-def test_a_program_that_is_not_convex_is_not_made() -> None:
-    above = cr.gallery.case("convexity-end-above")
-    with pytest.raises(cr.solvers.TooDenseError):
-        cr.program(above.scene, **above.control)
-
-
 def test_the_command_for_a_scene(command: Any, tmp_path: Path) -> None:
     command("new", "scene.toml")
     ran = command("export", "scene.toml", "--bristles", "4")

@@ -591,8 +591,3 @@ def test_in_other_packages(package: str) -> None:
     np.testing.assert_array_equal(library.grad(function)(x), slopes)
     squared = library.grad(lambda y: function(y) ** 2)(x)
     np.testing.assert_allclose(squared, 2 * value * slopes, rtol=1e-14)
-
-
-def test_a_force_without_use_is_refused() -> None:
-    with pytest.raises(cr.InputError, match=r"force: found .*, expected none, as the load does"):
-        of_loss(of="load", load=None, approach=5e-5)
