@@ -208,7 +208,6 @@ def shown(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
     monkeypatch.syspath_prepend(FOLDER)  # as for a script: one example may begin with another
     with plt.rc_context():
         yield figures
-    plt.close("all")
 
 
 def load(path: Path) -> dict[str, Any]:

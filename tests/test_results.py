@@ -136,21 +136,17 @@ def test_copies_keep_every_bit_and_what_is_read_only() -> None:
                 assert not other.flags.writeable
 
 
-@pytest.mark.parametrize(
-    "error",
-    [
+def test_errors_pass_between_processes() -> None:
+    for error in (
         cr.InputError("load", found=-1, expected="a positive number", where="a.toml"),
         cr.SolverError("no step", solver="newton", advice="less load", iterate=np.ones(2)),
         SceneFileError("a.toml", ["one", "two"]),
         ExtraError("pandas"),
         cr.FileError("a.toml: missing"),
-    ],
-    ids=lambda error: type(error).__name__,
-)
-def test_errors_pass_between_processes(error: cr.ConvexroughError) -> None:
-    again = pickle.loads(pickle.dumps(error))
-    assert (type(again), str(again), again.args) == (type(error), str(error), error.args)
-    assert repr(vars(again)) == repr(vars(error))
+    ):
+        again = pickle.loads(pickle.dumps(error))
+        assert (type(again), str(again), again.args) == (type(error), str(error), error.args)
+        assert repr(vars(again)) == repr(vars(error))
 
 
 def columns(result: Any) -> dict[str, np.ndarray[Any, Any]]:

@@ -317,9 +317,6 @@ def test_intervals_hold_what_they_should() -> None:
         assert root.high - root.low <= root.high / 2**120
     with pytest.raises(Refused, match="may be 0"):
         Interval(1) / Interval(-1, 1)
-
-
-def test_pi() -> None:
     with ctx.workdps(60):
         assert quotient(checker.PI.low) < arb.pi() < quotient(checker.PI.high)
 

@@ -138,9 +138,8 @@ def test_dask(cluster: Any) -> None:
         assert same(run(PLAN, engine)[0], WHOLE)
 
 
-def test_a_worker_of_dask_is_killed(cluster: Any, tmp_path: Path) -> None:
-    contents = tables(sweep={"seeds": 16, "measure": ["load"]})
-    plan = plan_of(contents, Path("sweep"))
+def test_a_worker_of_dask_is_killed(cluster: Any, tmp_path: Path, whole: cr.SweepTable) -> None:
+    plan = plan_of(CONTENTS, Path("sweep"))
     killed: list[int] = []
 
     def kill(record: logging.LogRecord) -> None:
@@ -152,7 +151,7 @@ def test_a_worker_of_dask_is_killed(cluster: Any, tmp_path: Path) -> None:
     with dask(cluster.scheduler_address) as engine, logged(kill):
         table = run(plan, engine, out=tmp_path / "a")[0]
     assert killed
-    assert same(table, swept(contents))
+    assert same(table, whole)
     assert set(table.read(["status"])["status"]) == {"certified"}
 
 
