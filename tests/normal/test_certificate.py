@@ -10,25 +10,9 @@ from typing import Any
 import multiprecision
 import numpy as np
 import pytest
+import scenes
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from scenes import (
-    CASES,
-    EVERY,
-    MATERIAL,
-    NAMED,
-    OPERATORS,
-    PAPER_APPROACH,
-    hexagonal,
-    on_sphere,
-    operators,
-    paper,
-    prescribed,
-    random_cases,
-    reference,
-    solve_exactly,
-    twins,
-)
 from status_audit import ATTACKS, assert_honest, attack, excess
 
 import convexrough as cr
@@ -54,32 +38,32 @@ from convexrough.solvers import Newton
 
 @pytest.mark.sample(6)
 @pytest.mark.parametrize("kind", ATTACKS)
-@pytest.mark.parametrize(("name", "operator"), CASES)
+@pytest.mark.parametrize(("name", "operator"), scenes.CASES)
 def test_attacks_on_known_scenes(name: str, operator: Kind, kind: str) -> None:
-    scene, approach = EVERY[name]
-    exact = reference(scene, approach=approach)
+    scene, approach = scenes.EVERY[name]
+    exact = scenes.reference(scene, approach=approach)
     contact = cr.press(scene, approach=approach)
     for seed in range(3):
         wrong = attack(kind, contact.loads, np.random.default_rng(seed))
         judged = cr.certify(scene, wrong, approach=approach, influence=operator)
         assert_honest(judged, wrong, exact)
         if wrong.any():
-            exact_load = reference(scene, load=contact.load)
+            exact_load = scenes.reference(scene, load=contact.load)
             judged = cr.certify(scene, wrong, load=contact.load, influence=operator)
             assert_honest(judged, wrong, exact_load)
 
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("kind", ATTACKS)
-@pytest.mark.parametrize("operator", OPERATORS)
+@pytest.mark.parametrize("operator", scenes.OPERATORS)
 def test_attacks_on_a_local_certificate(operator: Kind, kind: str) -> None:
     """Where only a box is convex: loads outside it must not be proved, nor their neighbours."""
-    scene = hexagonal(0.0012, 0.2)
-    contact = cr.press(scene, approach=PAPER_APPROACH, influence="dense")
+    scene = scenes.hexagonal(0.0012, 0.2)
+    contact = cr.press(scene, approach=scenes.PAPER_APPROACH, influence="dense")
     assert contact.certificate.scope == "local"
     for seed in range(4):
         wrong = attack(kind, contact.loads, np.random.default_rng(seed))
-        certificate = cr.certify(scene, wrong, approach=PAPER_APPROACH, influence=operator)
+        certificate = cr.certify(scene, wrong, approach=scenes.PAPER_APPROACH, influence=operator)
         assert kind != "none" or certificate.scope == "local"
         if certificate.scope == "none":
             continue
@@ -91,14 +75,16 @@ def test_attacks_on_a_local_certificate(operator: Kind, kind: str) -> None:
 
 
 @settings(max_examples=12, deadline=None)
-@given(random_cases(crowding=1.2, most=10), st.sampled_from(ATTACKS), st.integers(0, 2**32 - 1))
+@given(
+    scenes.random_cases(crowding=1.2, most=10), st.sampled_from(ATTACKS), st.integers(0, 2**32 - 1)
+)
 def test_attacks_on_random_scenes(sampled: Any, kind: str, seed: int) -> None:
     scene, approach, operator = sampled
     contact = cr.press(scene, approach=approach)
     wrong = attack(kind, contact.loads, np.random.default_rng(seed))
     certificate = cr.certify(scene, wrong, approach=approach, influence=operator)
     if certificate.scope != "none" and contact.load > 0:
-        exact = solve_exactly(scene, approach=approach, start=contact.loads)
+        exact = scenes.solve_exactly(scene, approach=approach, start=contact.loads)
         assert_honest(certificate, wrong, exact)
         if kind == "none":
             assert certificate.all_proved
@@ -108,7 +94,7 @@ def test_attacks_on_random_scenes(sampled: Any, kind: str, seed: int) -> None:
     if wrong[candidates].any():  # else there is nothing to scale to the load: an InputError
         certificate = cr.certify(scene, wrong, load=contact.load, influence=operator)
         if certificate.scope != "none":
-            exact = solve_exactly(scene, load=contact.load, start=contact.loads)
+            exact = scenes.solve_exactly(scene, load=contact.load, start=contact.loads)
             assert_honest(certificate, wrong, exact)
 
 
@@ -120,8 +106,8 @@ def test_touching_to_rounding(steps: int) -> None:
     approach = k * load ** (2 / 3)
     height = load / (np.pi * r) - approach + r**2 / 2
     height += steps * np.spacing(height)
-    scene = on_sphere([[0, 0], [r, 0]], 0.01, [0, height])
-    contact, exact = cr.press(scene, approach=approach), reference(scene, approach=approach)
+    scene = scenes.on_sphere([[0, 0], [r, 0]], 0.01, [0, height])
+    contact, exact = cr.press(scene, approach=approach), scenes.reference(scene, approach=approach)
     assert_honest(contact.certificate, contact.loads, exact)
     assert contact.certificate.scope == "global"
     assert list(contact.status) == ["contact", "contact" if exact.loads[1] > 0 else "open"]
@@ -130,19 +116,21 @@ def test_touching_to_rounding(steps: int) -> None:
 
 def test_touching_exactly_is_undecided() -> None:
     """Neither load nor gap: two asperities that first touch at approach 0, all numbers exact."""
-    contact = cr.press(on_sphere([[0.0, 0.0], [0.5, 0.0]], heights=[0.0, 0.125]), approach=0.0)
+    contact = cr.press(
+        scenes.on_sphere([[0.0, 0.0], [0.5, 0.0]], heights=[0.0, 0.125]), approach=0.0
+    )
     assert list(contact.status) == ["undecided", "undecided"]
     assert list(contact.loads) == [0.0, 0.0]
     assert not contact.certificate.all_proved
 
 
-@pytest.mark.parametrize("kind", OPERATORS)
+@pytest.mark.parametrize("kind", scenes.OPERATORS)
 def test_scopes(kind: Kind) -> None:
     """From easy to hard: the shells, the Cholesky test or secants, a local box, nothing."""
 
     def pressed(spacing: float, tip_radius: float) -> cr.Certificate:
-        scene = hexagonal(spacing, tip_radius)
-        return cr.press(scene, approach=PAPER_APPROACH, influence=kind).certificate
+        scene = scenes.hexagonal(spacing, tip_radius)
+        return cr.press(scene, approach=scenes.PAPER_APPROACH, influence=kind).certificate
 
     shells, cholesky = pressed(0.0012, 0.01), pressed(0.0012, 0.03)
     local, crowded = pressed(0.0012, 0.2), pressed(0.0025, 5.0)
@@ -152,8 +140,8 @@ def test_scopes(kind: Kind) -> None:
     assert (cholesky.convexity_number in (0.9, 0.999)) == (kind == "dense")
     assert local.all_proved
     assert crowded.fixed_open > local.fixed_open == 0
-    scene, load = twins()
-    if kind in operators(scene):
+    scene, load = scenes.twins()
+    if kind in scenes.operators(scene):
         nothing = cr.press(scene, load=load, influence=kind).certificate
         assert (nothing.scope, nothing.all_proved) == ("none", False)
         assert np.isinf(nothing.load_errors).all()
@@ -162,13 +150,13 @@ def test_scopes(kind: Kind) -> None:
 
 
 @pytest.mark.sample(3)
-@pytest.mark.parametrize("operator", OPERATORS)
+@pytest.mark.parametrize("operator", scenes.OPERATORS)
 @pytest.mark.parametrize("seed", range(20))
 def test_the_box_is_as_convex_as_it_says(seed: int, operator: Kind) -> None:
     """For any loads: also of a few large contacts among many asperities that are open."""
     rng = np.random.default_rng(seed)
     lattice = cr.Asperities.square(spacing=1e-3, tip_radius=0.05, within=6e-3)
-    scene = cr.Scene(1e3, lattice, MATERIAL, geometry="summit")
+    scene = cr.Scene(1e3, lattice, scenes.MATERIAL, geometry="summit")
     touching = rng.choice(len(scene), 2 + seed // 5, replace=False)
     radii = np.zeros(len(scene))
     radii[touching] = 1e-3 * rng.uniform(0.6, 0.75, len(touching))
@@ -186,7 +174,7 @@ def test_the_box_is_as_convex_as_it_says(seed: int, operator: Kind) -> None:
 @given(st.integers(0, 2**32 - 1), st.floats(0.1, 3))
 def test_the_convex_margin_is_a_lower_bound(seed: int, size: float) -> None:
     rng = np.random.default_rng(seed)
-    scene = on_sphere(rng.uniform(-1, 1, (12, 2)) * 1e-2)
+    scene = scenes.on_sphere(rng.uniform(-1, 1, (12, 2)) * 1e-2)
     problem = NormalProblem.assemble(scene, approach=1e-4)
     h = problem.compliance(problem.bounds(problem.approach_bound) * size)
     hessian = problem.influence.matrix / np.sqrt(h) / np.sqrt(h)[:, None] + np.eye(12)
@@ -204,18 +192,18 @@ def test_gaps_of_screened_neighbours_that_nearly_coincide(seed: int) -> None:
     first = rng.uniform(-1, 1, 2)
     points = np.array([first, first + 10.0 ** rng.uniform(-11, -2) * rng.normal(size=2)])
     heights = (points**2).sum(axis=1) / 2 / (1 + tips) + [1e-4, -2e-4]  # drops, and unlike
-    scene = cr.Scene(1.0, cr.Asperities(points, tips, heights), MATERIAL, None, "closest")
+    scene = cr.Scene(1.0, cr.Asperities(points, tips, heights), scenes.MATERIAL, None, "closest")
     contact = cr.press(scene, approach=1e-4)
-    assert_honest(contact.certificate, contact.loads, reference(scene, approach=1e-4))
+    assert_honest(contact.certificate, contact.loads, scenes.reference(scene, approach=1e-4))
 
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("control", ["approach", "load"])
-@pytest.mark.parametrize("kind", operators(paper()))
+@pytest.mark.parametrize("kind", scenes.operators(scenes.paper()))
 def test_screened_asperities_are_open_whatever_the_loads(kind: Kind, control: str) -> None:
     """With the whole load on one asperity, gaps are known to within more than themselves."""
-    scene = paper()
-    given = prescribed(scene, 3e-5, control)
+    scene = scenes.paper()
+    given = scenes.prescribed(scene, 3e-5, control)
     candidates = NormalProblem.assemble(scene, **given).candidates
     screened = np.setdiff1d(np.arange(61), candidates)
     wrong = np.zeros(61)
@@ -226,16 +214,18 @@ def test_screened_asperities_are_open_whatever_the_loads(kind: Kind, control: st
     assert (certificate.gap_errors[screened] > certificate.gaps[screened]).all()
     assert (certificate.status[screened] == "open").all()
     assert certificate.load_errors[60] == 1e-9
-    assert_honest(certificate, wrong, reference(scene, **given))
+    assert_honest(certificate, wrong, scenes.reference(scene, **given))
 
 
 def test_no_loads_under_load_control() -> None:
     """Also if the only load is on an asperity that cannot touch, or all are too small to scale."""
-    solution = cr.press(paper(), load=1e-7).loads
+    solution = cr.press(scenes.paper(), load=1e-7).loads
     assert solution[-1] == 0
     for loads in (np.zeros(61), np.r_[np.zeros(60), 1e-7], np.full(61, 5e-324)):
-        assert (cr.certify(paper(), loads, load=1e-7).load_errors >= np.abs(loads - solution)).all()
-        verdict = cr.verify(paper(), loads, load=1e-7)
+        assert (
+            cr.certify(scenes.paper(), loads, load=1e-7).load_errors >= np.abs(loads - solution)
+        ).all()
+        verdict = cr.verify(scenes.paper(), loads, load=1e-7)
         assert not verdict.holds
         assert verdict.suspects[0] in {int(np.argmax(solution)), 60}
 
@@ -244,9 +234,9 @@ def test_no_loads_under_load_control() -> None:
 @pytest.mark.parametrize("control", ["approach", "load"])
 def test_the_duality_gap_is_that_of_float64_loads(control: str, off: float) -> None:
     """Of pressed loads, and with an error of the largest; both are scaled to a prescribed load."""
-    scene = paper("closest")
-    given = prescribed(scene, PAPER_APPROACH, control)
-    contact, exact = cr.press(scene, **given), reference(scene, **given)
+    scene = scenes.paper("closest")
+    given = scenes.prescribed(scene, scenes.PAPER_APPROACH, control)
+    contact, exact = cr.press(scene, **given), scenes.reference(scene, **given)
     wrong, certificate = contact.loads.copy(), contact.certificate
     if off:
         wrong[np.argmax(wrong)] *= 1 + off
@@ -259,8 +249,8 @@ def test_the_duality_gap_is_that_of_float64_loads(control: str, off: float) -> N
 
 @pytest.mark.parametrize("size", [1e-18, 1e-13, 1e-9])
 def test_the_duality_gap_counts_loads_on_screened_asperities(size: float) -> None:
-    scene, approach = NAMED["rough"]
-    contact, exact = (f(scene, approach=approach) for f in (cr.press, reference))
+    scene, approach = scenes.NAMED["rough"]
+    contact, exact = (f(scene, approach=approach) for f in (cr.press, scenes.reference))
     wrong = contact.loads.copy()
     wrong[np.argmax(scene.asperities.distances)] += size * contact.load
     above = excess(scene, wrong, exact)
@@ -271,17 +261,17 @@ def test_the_duality_gap_counts_loads_on_screened_asperities(size: float) -> Non
 @pytest.mark.parametrize("factor", [3.0, 1e25])
 def test_loads_far_too_large_under_load_control(factor: float) -> None:
     """Scaled to the total they are right; as they are, they are off by all but a little."""
-    scene = paper()
-    load = cr.press(scene, approach=PAPER_APPROACH).load
+    scene = scenes.paper()
+    load = cr.press(scene, approach=scenes.PAPER_APPROACH).load
     given = factor * cr.press(scene, load=load).loads
-    assert_honest(cr.certify(scene, given, load=load), given, reference(scene, load=load))
+    assert_honest(cr.certify(scene, given, load=load), given, scenes.reference(scene, load=load))
 
 
 @pytest.mark.parametrize("control", ["approach", "load"])
 def test_a_load_too_small_for_own_units_is_not_lost(control: str) -> None:
-    scene = replace(paper(), material=cr.Material(1e12, 0.3))
-    given = prescribed(scene, PAPER_APPROACH, control)
-    exact, wrong = reference(scene, **given), cr.press(scene, **given).loads.copy()
+    scene = replace(scenes.paper(), material=cr.Material(1e12, 0.3))
+    given = scenes.prescribed(scene, scenes.PAPER_APPROACH, control)
+    exact, wrong = scenes.reference(scene, **given), cr.press(scene, **given).loads.copy()
     problem = NormalProblem.assemble(scene, **given)
     assert problem.units.force > 8
     open_ones = np.setdiff1d(problem.candidates, np.flatnonzero(wrong))
@@ -292,7 +282,7 @@ def test_a_load_too_small_for_own_units_is_not_lost(control: str) -> None:
 
 def test_the_energy_of_loads_where_nothing_can_touch() -> None:
     """It is known at a prescribed approach; under a prescribed load it changes the scaling."""
-    scene = paper()
+    scene = scenes.paper()
     contact = cr.press(scene, load=1e-8)
     assert 60 not in NormalProblem.assemble(scene, load=1e-8).candidates
     loads = contact.loads.copy()
@@ -309,7 +299,7 @@ def random_points(seed: int, count: int, size: float = 1.0) -> cr.Scene:
     r, angle = 0.01 * np.sqrt(rng.random(count)), 2 * np.pi * rng.random(count)
     points = np.column_stack((r * np.cos(angle), r * np.sin(angle)))
     tips = size * 0.02 * np.sqrt(61 / count) * rng.lognormal(0, 0.2, count)
-    return on_sphere(points, tips, friction=0.5)
+    return scenes.on_sphere(points, tips, friction=0.5)
 
 
 @settings(max_examples=40, deadline=None)
@@ -319,7 +309,7 @@ def random_points(seed: int, count: int, size: float = 1.0) -> cr.Scene:
     st.integers(0, 2**32 - 1),
     st.integers(2, 20),
     st.floats(0.2, 4.0),
-    st.sampled_from(OPERATORS),
+    st.sampled_from(scenes.OPERATORS),
     st.floats(-17, -3),
 )
 def test_random_points_are_judged_honestly(
@@ -327,7 +317,7 @@ def test_random_points_are_judged_honestly(
 ) -> None:
     """Against the exact solution next to the loads, whatever these are off by; energies too."""
     scene = random_points(seed, count, size)
-    if kind not in operators(scene):
+    if kind not in scenes.operators(scene):
         return
     contact = cr.press(scene, approach=5e-5, influence=kind)
     off = 10.0**digits * np.random.default_rng(seed).standard_normal(count)
@@ -335,7 +325,9 @@ def test_random_points_are_judged_honestly(
     for control in ({"approach": 5e-5}, {"load": contact.load}):
         judged = cr.certify(scene, wrong, **control, influence=kind)
         try:
-            exact = solve_exactly(scene, **control, start=contact.loads + 1e-30 * contact.load)
+            exact = scenes.solve_exactly(
+                scene, **control, start=contact.loads + 1e-30 * contact.load
+            )
         except multiprecision.NotProved:
             continue
         near = multiprecision.off(contact.loads, exact.loads).max() < 1e-9 * contact.load
@@ -381,7 +373,7 @@ def all_states(scene: cr.Scene, approach: float) -> list[Any]:
             start = np.zeros(len(scene))
             start[list(touching)] = 1e-8
             try:
-                exact = solve_exactly(scene, approach=approach, start=start)
+                exact = scenes.solve_exactly(scene, approach=approach, start=start)
             except multiprecision.NotProved:
                 continue
             loads = np.array([float(load) for load in exact.loads])
@@ -394,7 +386,7 @@ def all_states(scene: cr.Scene, approach: float) -> list[Any]:
 def test_other_solutions_are_as_the_certificate_says(distance: float) -> None:
     """Twins, where there are two or three solutions: each is judged, and says true things."""
     points = np.array([[0.0, 0.0], [distance, 0.0], [3e-3, 0.0]])
-    scene, approach = on_sphere(points), 5e-5
+    scene, approach = scenes.on_sphere(points), 5e-5
     states = all_states(scene, approach)
     assert states
     inverse = inverse_distances(points, points)
@@ -416,11 +408,11 @@ def test_other_solutions_are_as_the_certificate_says(distance: float) -> None:
 @pytest.mark.parametrize("load", [0.0, 1e-12])
 def test_loads_at_the_bounds_of_their_ranges_prove_nothing(load: float) -> None:
     """Small loads lie in a box where the energy is convex, but least where loads are at bounds."""
-    scene, approach = on_sphere([[0, 0], [5.7e-4, 0]], heights=[-1.5e-5, 0.0]), 5e-5
+    scene, approach = scenes.on_sphere([[0, 0], [5.7e-4, 0]], heights=[-1.5e-5, 0.0]), 5e-5
     (only,) = all_states(scene, approach)
     assert only[0] == 0 < only[1]
     given = np.full(2, load)
-    exact = solve_exactly(scene, approach=approach, start=only)
+    exact = scenes.solve_exactly(scene, approach=approach, start=only)
     assert_honest(cr.certify(scene, given, approach=approach), given, exact)
 
 
@@ -475,7 +467,7 @@ def test_lattices_exclude_more_other_solutions() -> None:
     """Where shells of the secants meet, the lattice may still say that there is one solution."""
     rng, by_lattice = np.random.default_rng(3), 0
     for size in np.linspace(3.0, 8.0, 11):
-        scene = hexagonal(tip_radius=0.02 * size)
+        scene = scenes.hexagonal(tip_radius=0.02 * size)
         problem = NormalProblem.assemble(scene, approach=1e-4, influence="lattice")
         loads, most = Newton().solve(problem).loads, problem.bounds(problem.approach_bound)
         found, A = cr.press(scene, approach=1e-4, influence="lattice"), problem.influence
@@ -501,11 +493,11 @@ def test_poor_loads_of_a_prescribed_total_do_not_exclude_another_solution() -> N
     bank = cr.Asperities.hexagonal(spacing=1.0, tip_radius=0.4, within=1.9).positions
     assert len(bank) == 13
     apart, far = 1e-2, 1e4
-    loads = cr.press(on_sphere(bank, 0.4, radius=np.inf), approach=1.0).loads
+    loads = cr.press(scenes.on_sphere(bank, 0.4, radius=np.inf), approach=1.0).loads
     tips = (2.28 * apart) ** 2 / 0.5, (2.65 * apart) ** 2 / 0.475
     points = [*bank, (far, 0), (far + apart, 0), (-far, far)]
     heights = [0.0] * 13 + [-0.5, -0.525, -1.02]
-    scene = on_sphere(points, [0.4] * 13 + [*tips, 0.4], heights, radius=np.inf)
+    scene = scenes.on_sphere(points, [0.4] * 13 + [*tips, 0.4], heights, radius=np.inf)
     one = np.append(loads, [4 / 3 * np.sqrt(tips[0]) * 0.5**1.5, 0, 0])
     two = np.append(loads, [0, 4 / 3 * np.sqrt(tips[1]) * 0.475**1.5, 0])
     total = float(one.sum())
@@ -519,8 +511,8 @@ def test_poor_loads_of_a_prescribed_total_do_not_exclude_another_solution() -> N
 
 def test_no_load_is_proved_on_an_open_asperity() -> None:
     """Loads may be too small to be corrected: then the gap is proved in spite of them."""
-    contact = cr.press(paper(), approach=PAPER_APPROACH)
-    problem = NormalProblem.assemble(paper(), approach=PAPER_APPROACH)
+    contact = cr.press(scenes.paper(), approach=scenes.PAPER_APPROACH)
+    problem = NormalProblem.assemble(scenes.paper(), approach=scenes.PAPER_APPROACH)
     loads = contact.loads[problem.candidates] / problem.units.force
     k = int(np.flatnonzero(loads == 0)[0])
     loads[k] = 1e-25 * loads.max()
