@@ -551,7 +551,6 @@ OBJECTIVES = {
 }
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", OBJECTIVES)
 def test_its_gradient(name: str) -> None:
     objective = OBJECTIVES[name]
