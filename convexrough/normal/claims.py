@@ -122,12 +122,16 @@ class Claim(ABC):
         """True if the claim `holds`."""
         return self.holds
 
+    @property
+    def holds_by_default(self) -> bool:
+        """True if the claim `holds`, also with the default of `within`."""
+        return self.holds and self.error <= WITHIN
+
     def hints(self) -> Iterator[str]:
         """Lines that name a possible cause of wrong forces, such as a wrong unit or sign; none if
         the claim holds, also with the default of `within`.
         """
-        passed = self.holds and self.error <= WITHIN
-        if passed or (nearby := self.nearby()) is None:
+        if self.holds_by_default or (nearby := self.nearby()) is None:
             return
         values, true = (each / (self.largest or 1.0) for each in (self.values, nearby[0]))
         if np.abs(values - true).max() <= CORRECTED:  # the statuses are wrong, not the forces

@@ -58,9 +58,9 @@ class VectorShearState(Table, Plottable):
     solver, iterations : name of the solver, and its number of steps
 
     As in `shear`, Q counts as f P if |Q| and f P differ only by rounding. At |Q| = f P the forces
-    are f P_i along Q. If these forces displace the asperities by different
-    amounts perpendicular to Q, this state is the limit of an infinite displacement. The
-    displacement, the slips, `residual` and `duality_gap` are then infinite.
+    are f P_i along Q. If these forces displace the asperities by different amounts perpendicular
+    to Q, this state is the limit of an infinite displacement. The displacement, the slips,
+    `residual` and `duality_gap` are then infinite.
 
     >>> state = cr.shear_vector(contact, force=0.25 * contact.load)
     >>> state.forces.shape, state.certificate.all_proved

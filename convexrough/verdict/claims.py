@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from shlex import quote
 from typing import Any, NamedTuple
@@ -108,18 +108,17 @@ def judged(
     """The verdict on loads and, if any are given, that on shear forces with the sum `force`."""
     tolerance("--within", within)
     with blamed_on(loads.path):
-        verdict = verify_on(problem, loads.values, within=within, floor=floor)
-        if forces is None:
-            return [verdict]
-        contact = verdict.solution
-        if contact is None:
-            contact = verify_on(problem, loads.values, floor=floor, solved=True).solution
-    if contact is None:
+        solved = forces is not None
+        verdict = verify_on(problem, loads.values, within=within, floor=floor, solved=solved)
+    if forces is None:
+        return [verdict]
+    if (contact := verdict.solution) is None:
         raise SolverError("no solution near the loads is found, so shear forces have no contact")
     sliding = _claimed_to_slide(forces, contact)
     with blamed_on("--shear-force"):
         sheared = verify_shear(contact, forces.values, force=force, within=within, sliding=sliding)
-    return [verdict, sheared]
+    alone = replace(verdict, solution=None)
+    return [alone if alone.holds_by_default else verdict, sheared]
 
 
 def _claimed_to_slide(forces: Claimed, contact: Contact) -> NDArray[np.bool_] | None:
