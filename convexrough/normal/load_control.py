@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from convexrough.arrays import Array, Indices, largest, summed
+from convexrough.arithmetic.balls import TINY
+from convexrough.arrays import Array, Indices, largest, summed, taken
 from convexrough.errors import InputError
 from convexrough.influence import Kind, couple
 from convexrough.influence.choice import FEW_ASPERITIES
@@ -17,8 +18,9 @@ from convexrough.scene.base import along
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 
-#: In `all_that_could_touch` a scene extends to at least LEAST_REACH contact radii of a smooth body.
-#: If the weights are 0 beyond this, the bound is computed on a scene WIDER times as large.
+#: The bound is first computed from asperities within LEAST_REACH contact radii of a smooth body. In
+#: `all_that_could_touch` a scene extends at least that far. If the weights are 0 beyond this, the
+#: bound is computed on a scene WIDER times as large.
 LEAST_REACH, WIDER = 1.5, 4.0 / 3.0
 
 #: Relative change below which the shift tau of `shifted_to_load` counts as converged. A heuristic:
@@ -98,44 +100,86 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
     It is `approach_bound` with the weights `smooth_loads`. Where contact discs under these would
     reach their nearest neighbours, smaller loads are the weights, as the bound would be useless.
     """
-    modulus = scene.material.contact_modulus
-    coefficients = hertz.local_coefficient(modulus, scene.relative_radii)
-    weights = smooth_loads(scene, load)
+    bound, distances = np.nan, np.hypot(*scene.contact_points.T)
+    if scene.curved:
+        radius, heights = scene.mean_radius, scene.asperities.heights
+        a = float(hertz.contact_radius(load, scene.material.contact_modulus, radius))
+        beyond = 2.0 * radius * (heights.max() - heights.mean())
+        reach = np.sqrt((LEAST_REACH * a) ** 2 + beyond)
+        bound = _bound_within(float(reach), distances, scene, load, influence)
+    if np.isnan(bound):
+        bound = _bound_within(np.inf, distances, scene, load, influence)
+    if not np.isfinite(bound):
+        raise InputError("load", found=load, expected="a load within the range of float64")
+    return bound
+
+
+@np.errstate(all="ignore")
+def _bound_within(
+    reach: float, distances: Array, scene: Scene, load: float, influence: Kind | None
+) -> float:
+    """`highest_approach` with weights for asperities at `distances` up to `reach` from the axis.
+
+    It is nan if asperities beyond would have weights, too, or may be displaced by them more than
+    all others. Two asperities are at least as far apart as their distances from the axis differ.
+    """
+    far, modulus = distances > reach, scene.material.contact_modulus
+    near = scene.asperities.layout.sorted(~far)
+    if len(near) == 0:
+        return np.nan
+    weights, least = smooth_loads(scene, load, near)
     one_box = scene.lattice is not None and influence in (None, "lattice")
-    every = one_box or len(scene) <= FEW_ASPERITIES
-    which = np.arange(len(scene)) if every else np.flatnonzero(weights)
-    sources = couple(scene, which, 1.0 / (np.pi * modulus), influence)
+    every = one_box or len(near) <= FEW_ASPERITIES
+    which = np.arange(len(near)) if every else np.flatnonzero(weights)
+    sources = couple(scene, near[which], 1.0 / (np.pi * modulus), influence)
+    radii = taken(scene.relative_radii, near)
+    coefficients = hertz.local_coefficient(modulus, radii)
     if not one_box:
-        deepest = sources.separations() ** 2 / scene.relative_radii[which]
+        deepest = sources.separations() ** 2 / radii[which]
         fitting = np.minimum(weights[which], hertz.load(deepest, coefficients[which]))
         if fitting.any():
             weights[which] = fitting
     couplings: list[tuple[Indices, Coupling]] = [(which, sources)]
     if not every:
         others = np.flatnonzero(weights == 0)
-        couplings.append((others, sources.onto(scene.contact_points[others])))
-    displacement = np.empty(len(scene))
+        couplings.append((others, sources.onto(scene.contact_points[near[others]])))
+    displacement = np.empty(len(near))
     for index, coupling in couplings:
         displacement[index] = coupling.falloff(weights[which], 1) * (sources.scale * (1 + SAFETY))
-    least = scene.offsets - scene.offset_errors
-    bound = approach_bound(weights, displacement, coefficients, least, load)
-    if not np.isfinite(bound):
-        raise InputError("load", found=load, expected="a load within the range of float64")
-    return float(bound)
+    if far.any():
+        loaded = np.flatnonzero(weights)
+        apart = distances[far].min() * (1 - SAFETY) - distances[near[loaded]]
+        most = sources.scale * (weights[loaded] / np.maximum(apart, TINY)).sum() * (1 + SAFETY)
+        tall = np.flatnonzero(far & (scene.offsets > least))
+        if (lowered(scene, load, tall) > least).any() or most > displacement.max():
+            return np.nan
+    offsets = scene.offsets[near] - scene.offset_errors[near]
+    return float(approach_bound(weights, displacement, coefficients, offsets, load))
 
 
-def smooth_loads(scene: Scene, load: float) -> Array:
-    """(n,) [force] estimated loads with the total `load`, by Hertz's law at the indentations
-    offset - w + tau,  with a number tau and the displacement w by a smooth sphere under this load,
-    which has the mean curvature of the body (w = 0 for a flat).
+def smooth_loads(scene: Scene, load: float, which: Indices) -> tuple[Array, float]:
+    """Estimated loads of the asperities `which`, with the total `load`, and a number -tau [length].
+
+    They follow by Hertz's law from the indentations `lowered` + tau. If others are lower than -tau,
+    their loads would be 0.
     """
-    modulus, sunk = scene.material.contact_modulus, np.zeros(len(scene))
+    offsets = lowered(scene, load, which)
+    radii = taken(scene.relative_radii, which)
+    coefficients = hertz.local_coefficient(scene.material.contact_modulus, radii)
+    indentation = shifted_to_load(offsets, coefficients, load)
+    return np.asarray(hertz.load(indentation, coefficients)), float(offsets[0] - indentation[0])
+
+
+def lowered(scene: Scene, load: float, which: Indices) -> Array:
+    """(m,) [length] offsets of the asperities `which`, minus the displacements by a smooth sphere
+    under this load, which has the mean curvature of the body (0 for a flat).
+    """
+    offsets = scene.offsets[which]
     if scene.curved:
-        a = float(hertz.contact_radius(load, modulus, scene.mean_radius))
-        sunk = hertz.surface_displacement(scene.asperities.distances, a, scene.mean_radius)
-    coefficients = hertz.local_coefficient(modulus, scene.relative_radii)
-    indentation = shifted_to_load(scene.offsets - sunk, coefficients, load)
-    return np.asarray(hertz.load(indentation, coefficients))
+        a = float(hertz.contact_radius(load, scene.material.contact_modulus, scene.mean_radius))
+        distances = scene.asperities.distances[which]
+        offsets = offsets - hertz.surface_displacement(distances, a, scene.mean_radius)
+    return offsets
 
 
 def all_that_could_touch(
@@ -155,7 +199,8 @@ def all_that_could_touch(
     while True:
         reached = WIDER * within
         grown = scene_within(reached)
-        if smooth_loads(grown, load)[grown.asperities.distances > within].any():
+        weights, _ = smooth_loads(grown, load, np.arange(len(grown)))
+        if weights[grown.asperities.distances > within].any():
             reached, grown = within, scene_within(within)
         bound = highest_approach(grown, load)
         needed = farthest(bound)

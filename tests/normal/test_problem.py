@@ -70,6 +70,30 @@ def test_a_close_pair_does_not_make_candidates_of_all(kind: Kind) -> None:
     assert bounds[1] <= 1.05 * bounds[0]
 
 
+@pytest.mark.parametrize("kind", [None, "dense", "scattered"])
+@pytest.mark.parametrize(
+    ("within", "spacing", "raised"),
+    [
+        (0.02, 0.0008, {}),
+        (0.02, 0.0008, dict.fromkeys(range(900, 2263), 1e-4)),  # the highest ones are far out
+        (0.02, 0.0008, {0: 2e-6}),
+        (0.003, 0.0016, {0: 1.2e-7}),  # one asperity within 1.5 contact radii, six beyond
+    ],
+)
+def test_the_bound_in_a_wide_scene(
+    within: float, spacing: float, raised: dict[int, float], kind: Kind | None
+) -> None:
+    """It comes from the asperities near the axis where this is enough, and is close anyway."""
+    regular = cr.Asperities.hexagonal(spacing=spacing, tip_radius=0.01, within=within)
+    heights = np.zeros(len(regular))
+    heights[[*raised]] = [*raised.values()]
+    scene = cr.Scene(1.0, regular.with_tips(0.01, heights), scenes.MATERIAL)
+    for load in (1e-10, 1e-9, 1e-8, 1e-7):
+        approach = cr.press(scene, load=load, influence=kind).certificate.approach
+        bound = highest_approach(scene, load, kind)
+        assert approach * (1 - 1e-12) <= bound <= approach + 0.1 * (approach + max(heights))
+
+
 @settings(max_examples=8, deadline=None)
 @given(scenes.random_cases(crowding=0.99), st.integers(0, 2**32 - 1), st.floats(-6, 3))
 def test_newton_converges_from_any_start(sampled: Case, seed: int, size: float) -> None:
