@@ -21,11 +21,11 @@ from convexrough.errors import InputError, ProofError, SolverError
 from convexrough.influence import Influence, Kind
 from convexrough.influence.choice import couple
 from convexrough.influence.shells import shells
-from convexrough.normal.certificate import Certificate, certificate_of, certify_on
+from convexrough.normal.certificate import MOST_KEPT, Certificate, certificate_of, certify_on
 from convexrough.normal.exact import Units
 from convexrough.normal.level import Level
 from convexrough.normal.levels import Levels
-from convexrough.normal.problem import ALL_SHARP, NormalProblem
+from convexrough.normal.problem import NormalProblem
 from convexrough.normal.proved import proved
 from convexrough.normal.refine import Trial, is_of, refined_loads, sharpened
 from convexrough.plottable import Plottable
@@ -44,9 +44,6 @@ FEW = 128
 #: A summit counts as beside a contact disc up to this multiple of the contact radius from the
 #: centre. There the displacements by a point force are 5 % too small, at the rim of the disc 15 %.
 BESIDE = 1.5
-
-#: A contact of at most this many asperities that can touch keeps what friction needs of its press.
-MOST_KEPT = {"dense": ALL_SHARP, "lattice": 2**19, "scattered": 2**16}
 
 if TYPE_CHECKING:
     from convexrough.gradients.change import ContactChange, Direction

@@ -4,6 +4,7 @@ import json
 import re
 import sys
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -141,7 +142,8 @@ def test_each_kind_of_contradiction() -> None:
 
     outermost = int(np.argmax(proof.gaps))
     wide = shifted(proof.gaps, outermost, 3 * proof.gap_errors[outermost])
-    (line,) = contradictions(true, forged(contact, gaps=wide))
+    depths = partial(tuple, (-wide, proof.gap_errors))
+    (line,) = contradictions(true, forged(contact, _depths=depths))
     assert f"gaps of asperities {outermost}: " in line
 
     (line,) = contradictions(true, forged(contact, approach=6e-5))

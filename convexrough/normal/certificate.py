@@ -7,20 +7,21 @@ loads, and this module bounds the distance from the given loads to that solution
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import ClassVar
+from functools import cached_property, partial
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from convexrough import checks
+from convexrough import checks, threads
 from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.influence import Kind, couple
 from convexrough.normal.boxes import Box, Scope
 from convexrough.normal.level import Level
-from convexrough.normal.problem import NormalProblem
+from convexrough.normal.problem import ALL_SHARP, NormalProblem
 from convexrough.normal.proved import proved
 from convexrough.normal.refine import Trial, refined, trial_of
 from convexrough.record import Along, Proved
@@ -31,6 +32,10 @@ from convexrough.sphere import hertz
 #: Statuses by their codes.
 STATUSES = np.array(["undecided", "contact", "open"])
 TOUCHING, OPEN = 1, 2
+
+#: For at most this many asperities that can touch, contacts and certificates keep operators: those
+#: for what friction needs of the press, these for the gaps of the other asperities.
+MOST_KEPT = {"dense": ALL_SHARP, "lattice": 2**19, "scattered": 2**16}
 
 #: If no contact radius of a solution exceeds this fraction of the distance to the nearest
 #: neighbour, every other solution has a contact disc that covers the summit of the nearest
@@ -52,7 +57,8 @@ class Certificate(Proved):
         local compliances at the upper ends of the box
     codes : index of each status in `STATUSES`
     load_errors : [force] bounds on |load - load in the solution|
-    gaps : [length] gaps under these loads; 0 where an asperity touches
+    gaps : [length] gaps under these loads; 0 where an asperity touches. Gaps of asperities that
+        cannot touch are computed when they are first asked for
     gap_errors : [length] bounds on |gap - gap in the solution|
     approach : [length] the prescribed approach; under a prescribed load, that at which a weighted
         mean of the gaps of loaded asperities is 0
@@ -79,15 +85,15 @@ class Certificate(Proved):
     ('global', True, True)
     """
 
-    _shown = ("all_proved", "meaning", "status", "load_error", "gap_error")
+    _shown = ("all_proved", "meaning", "status", "load_error", "gap_error", "gaps", "gap_errors")
     _along: ClassVar[Along] = {("asperity",): ("status", "load_errors", "gaps", "gap_errors")}
 
     scope: Scope
     convexity_number: float
     codes: NDArray[np.int8] = field(repr=False)
     load_errors: Array
-    gaps: Array
-    gap_errors: Array
+    #: The indentations [length] of all asperities, minus the gap where open, and their errors.
+    _depths: Callable[[], tuple[Array, ...]] = field(repr=False)
     approach: float
     approach_error: float
     duality_gap: float
@@ -96,6 +102,21 @@ class Certificate(Proved):
     other_solutions_cover: bool = False
     in_the_way: Indices = field(default_factory=lambda: frozen(np.zeros(0, dtype=np.intp)))
     obstacle: str = ""
+
+    def __getstate__(self) -> dict[str, Any]:
+        return super().__getstate__() | {"_depths": partial(tuple, self._known_depths)}
+
+    @cached_property
+    def _known_depths(self) -> tuple[Array, ...]:
+        return self._depths()
+
+    @cached_property
+    def gaps(self) -> Array:
+        return frozen(np.maximum(-self._known_depths[0], 0.0))
+
+    @property
+    def gap_errors(self) -> Array:
+        return frozen(self._known_depths[1])
 
     @cached_property
     def status(self) -> NDArray[np.str_]:
@@ -207,25 +228,23 @@ def certificate_of(level: Level, loads: Array, start: Trial) -> Certificate:
     shift = float(_apart(start.approach.value, level.approach))
     here = start is level.trial
     known = level.indentation if here else start.indentation
-    others, below, beyond, errors_beyond = _screened(
-        problem, start, P if box is None else moved, shift
-    )
-    indentation = problem.to_scene(known.value)
-    indentation[others] = beyond
-    gaps = frozen(np.maximum(-indentation, 0.0) * length)
-    approach = float(start.approach.value) * length
+    approach = float(start.approach.value)
+    if box is None:
+        off = np.full(len(P), np.inf)
+        depths = Depths(problem, P, P, approach, np.inf, known.value, off)
+    else:
+        off = level.indentation.error if here else (level.indentation - known.value).size
+        depths = Depths(problem, P, moved, approach, shift, known.value, off * (1 + SAFETY))
     approach_error = 0.0 if problem.load is None else shift * (1 + SAFETY) * length
     if box is None:
-        nothing = frozen(np.full(len(loads), np.inf))
         reason, which = level.obstacle or ("", np.zeros(0, dtype=np.intp))
         return Certificate(
             scope="none",
             convexity_number=max(1.0, problem.convexity_number(P)),
             codes=frozen(np.zeros(len(loads), dtype=np.int8)),
-            load_errors=nothing,
-            gaps=gaps,
-            gap_errors=nothing,
-            approach=approach,
+            load_errors=frozen(np.full(len(loads), np.inf)),
+            _depths=depths.kept(),
+            approach=approach * length,
             approach_error=approach_error,
             duality_gap=np.inf,
             in_the_way=frozen(problem.candidates[which]),
@@ -238,30 +257,86 @@ def certificate_of(level: Level, loads: Array, start: Trial) -> Certificate:
     load_errors[problem.candidates] -= scaled * force
     np.abs(load_errors, out=load_errors)
     load_errors[problem.candidates] += _apart(scaled, level.loads) * force
-    errors = problem.to_scene(
-        level.indentation.error if here else (level.indentation - known.value).size
-    )
-    errors[others] = errors_beyond
-    errors *= 1 + SAFETY
-    codes = np.where(indentation < -errors, np.int8(OPEN), np.int8(0))
-    codes[others[below]] = OPEN
+    codes = depths.codes()
     codes[problem.candidates[level.touching]] = TOUCHING
     codes[problem.candidates[level.open]] = OPEN
-    energy += _screened_energy(problem, loads, indentation, errors)
+    energy += _screened_energy(depths, loads)
     return Certificate(
         scope="local" if possible else "global",
         convexity_number=box.convexity_number,
         codes=frozen(codes),
         load_errors=frozen(load_errors),
-        gaps=gaps,
-        gap_errors=frozen(errors * length),
-        approach=approach,
+        _depths=depths.kept(),
+        approach=approach * length,
         approach_error=approach_error,
         duality_gap=energy * (force * length),
         fixed_open=int(box.fixed_open.sum()),
         other_solutions_crowding=crowding,
         other_solutions_cover=cover,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class Depths:
+    """Indentations under given loads, minus gaps where open, with bounds on their errors.
+
+    Arrays are (n,), for the asperities that can touch, and in scaled units.
+    """
+
+    problem: NormalProblem
+    loads: Array
+    moved: Array  # error bounds of the loads
+    approach: float
+    shift: float  # error bound of the approach
+    value: Array  # the indentations, minus gaps where open
+    error: Array  # error bounds of these; infinite if nothing is proved
+
+    def kept(self) -> Callable[[], tuple[Array, ...]]:
+        """These depths or, if that would keep a large operator, a function that returns them."""
+        few = len(self.problem) <= MOST_KEPT[self.problem.influence.name]
+        return self if few else partial(tuple, self())
+
+    def __call__(self) -> tuple[Array, ...]:
+        """(N,) [length] indentations of all asperities of the scene, and their error bounds."""
+        with threads.one_where(4 * len(self.problem)):
+            beyond = self.of_screened(which := self.screened)
+        whole = tuple(self.problem.to_scene(each) for each in (self.value, self.error))
+        for each, outer in zip(whole, beyond, strict=True):
+            each[which] = outer
+            each *= self.problem.units.length
+        return whole
+
+    @property
+    def screened(self) -> Indices:
+        """Indices of the asperities that cannot touch: approach plus offset is at most 0 in every
+        solution.
+        """
+        left = np.ones(len(self.problem.scene), dtype=bool)
+        left[self.problem.candidates] = False
+        return left.nonzero()[0]
+
+    def of_screened(self, which: Indices) -> tuple[Array, Array]:
+        """(m,) indentations of these asperities, which cannot touch, and their error bounds."""
+        if len(which) == 0:
+            return np.zeros(0), np.zeros(0)
+        scene, length = self.problem.scene, self.problem.units.length
+        coupling = self.problem.influence.onto(scene.contact_points[which])
+        product, offsets = coupling.apply(self.loads), scene.offsets[which] / length
+        errors = coupling.rounding(self.loads).of(product) + scene.offset_errors[which] / length
+        errors += 16 * ROUNDOFF * (np.abs(product) + np.abs(offsets) + abs(self.approach))
+        moved = coupling.apply(self.moved)
+        errors += self.shift + (moved + coupling.rounding(self.moved).of(moved))
+        return self.approach + offsets - product, errors * (1 + SAFETY)
+
+    def codes(self) -> NDArray[np.int8]:
+        """(N,) the codes of statuses that follow from the indentations alone."""
+        codes = np.where(self.problem.to_scene(self.value < -self.error), np.int8(OPEN), np.int8(0))
+        which = self.screened
+        below = (self.problem.scene.offsets[which] != 0) | (self.problem.highest != 0)
+        codes[which[below]] = OPEN
+        n, errors = self.of_screened(level := which[~below])  # without load they are not displaced
+        codes[level[n < -errors]] = OPEN
+        return codes
 
 
 def _apart(values: Array, found: Ball) -> Array:
@@ -299,36 +374,11 @@ def _energy_error(found: Level, box: Box, start: Trial, moved: Array) -> float:
     return (float(excess @ moved) + missing) * (1 + SAFETY + len(moved) * ROUNDOFF)
 
 
-def _screened(
-    problem: NormalProblem, start: Trial, moved: Array, shift: float
-) -> tuple[Indices, NDArray[np.bool_], Array, Array]:
-    """The asperities that cannot touch, as approach plus offset is at most 0 in every solution:
-    their indices in the scene; False where approach and offset are both 0, else True; and their
-    indentations, with error bounds from those of the loads (`moved`) and the approach (`shift`).
-    """
-    scene, length, loads = problem.scene, problem.units.length, start.loads.high
-    left = np.ones(len(scene), dtype=bool)
-    left[problem.candidates] = False
-    which = left.nonzero()[0]
-    if len(which) == 0:
-        return which, which > 0, np.zeros(0), np.zeros(0)
-    coupling = problem.influence.onto(scene.contact_points[which])
-    product, offsets = coupling.apply(loads), scene.offsets[which] / length
-    approach = float(start.approach.value)
-    errors = coupling.rounding(loads).of(product) + scene.offset_errors[which] / length
-    errors += 16 * ROUNDOFF * (np.abs(product) + np.abs(offsets) + abs(approach))
-    coupled = coupling.apply(moved)
-    errors = errors + shift + (coupled + coupling.rounding(moved).of(coupled))
-    return which, (offsets != 0) | (problem.highest != 0), approach + offsets - product, errors
-
-
-def _screened_energy(
-    problem: NormalProblem, loads: Array, indentation: Array, errors: Array
-) -> float:
+def _screened_energy(depths: Depths, loads: Array) -> float:
     """Bound on sum (3/5) k s^(5/3) + g's + s'A s / 2, the energy of loads s on asperities that
     cannot touch, with their gaps g; infinite if there are such loads under load control.
     """
-    screened = loads > 0
+    problem, screened = depths.problem, loads > 0
     screened[problem.candidates] = False
     which = np.flatnonzero(screened)
     if len(which) == 0:
@@ -343,8 +393,10 @@ def _screened_energy(
     moved = coupling.apply(s)
     moved += coupling.rounding(s).of(moved)
     local = 0.6 * hertz.indentation(s, coefficients * problem.units.local)
-    outside = errors[which] - indentation[which]
-    energy = float(s @ (local + outside + 0.5 * np.maximum(moved, 0.0))) * (1 + SAFETY)
+    indentation, errors = depths.of_screened(which)
+    energy = float(s @ (local + (errors - indentation) + 0.5 * np.maximum(moved, 0.0))) * (
+        1 + SAFETY
+    )
     return max(energy, checks.SMALLEST)
 
 

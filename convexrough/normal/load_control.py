@@ -177,7 +177,7 @@ def lowered(scene: Scene, load: float, which: Indices) -> Array:
     offsets = scene.offsets[which]
     if scene.curved:
         a = float(hertz.contact_radius(load, scene.material.contact_modulus, scene.mean_radius))
-        distances = scene.asperities.distances[which]
+        distances = np.hypot(*scene.asperities.positions[which].T)
         offsets = offsets - hertz.surface_displacement(distances, a, scene.mean_radius)
     return offsets
 
