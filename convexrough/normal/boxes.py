@@ -24,12 +24,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arithmetic.balls import Ball
+from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices, even
 from convexrough.convex.definite import largest, proved_margin, proved_sparse_margin
+from convexrough.convex.newton_step import correct
+from convexrough.errors import SolverError
 from convexrough.influence.coupling import Influence
 from convexrough.influence.shells import fitted_shells
 from convexrough.normal.problem import NormalProblem, convexity_number
 from convexrough.roundoff import ROUNDOFF, SAFETY
+from convexrough.sphere import hertz
 
 Scope = Literal["global", "local", "none"]
 
@@ -67,6 +71,9 @@ WIDE = 2.0
 #: Largest number of asperities for which a proof by overlapping shells is tried. Such a proof needs
 #: several eliminations, and one takes 5 s for 100,000 asperities.
 MOST_ELIMINATED = 200_000
+
+#: Relative accuracy of the rates in `highest_by_rates`, whose result depends on its square.
+RATES = 1e-5
 
 
 class Box(NamedTuple):
@@ -125,10 +132,9 @@ def tried(problem: NormalProblem, loads: Array, displacement: Ball) -> Box | Non
     """The global box, which contains every solution, if convexity on it is proved; or else a local
     box, which contains `loads`; or None. `displacement` (n,) is A times `loads`.
     """
-    highest = problem.overhang(loads, displacement)
-    box = widest(problem, loads, highest)
-    if problem.by_load and not box.convexity_number < 1:  # this bound costs more
-        box = widest(problem, loads, min(highest, problem.approach_bound))
+    box = widest(problem, loads, problem.overhang(loads, displacement))
+    if problem.by_load and not box.convexity_number < 1:
+        box = widest(problem, loads, highest_by_rates(problem, loads))
     if not box.convexity_number < 1 and problem.influence.stored:
         margin = convex_margin(problem.influence, box.compliance, MARGINS)
         box = box._replace(convexity_number=1.0 - margin)
@@ -148,6 +154,23 @@ def tried(problem: NormalProblem, loads: Array, displacement: Ball) -> Box | Non
     local = np.minimum(box.loads, faces)
     h, beyond = problem.compliance(local), np.where(faces < box.loads, faces, np.inf)
     return Box("local", shells, local, h, theta, beyond, box.fixed_open)
+
+
+def highest_by_rates(problem: NormalProblem, loads: Array) -> float:
+    """An upper bound on D0 at every solution under a prescribed load; near `loads` (n,) of a
+    solution in which loads and indentations increase with the total, hardly above its D0.
+
+    It is (2) of docs/theory/certificate.md with the rates q = dP/dL as weights.
+    """
+    local = hertz.indentation(loads, problem.coefficients)
+    slopes = np.divide(1.5 * loads, local, out=np.zeros(len(loads)), where=loads > 0)
+    parts = problem.influence, problem.shells, np.sqrt(slopes), np.full(len(loads), -1.0)
+    try:
+        moved = correct(*parts, balanced=False, tolerance=RATES)
+    except SolverError:  # the energy may not be convex there
+        return problem.approach_bound
+    rates = np.maximum(slopes * moved, 0.0)
+    return float(problem.overhang(rates, problem.plain_product(Pair.exact(rates))))
 
 
 def box_of_touching(

@@ -19,7 +19,7 @@ from convexrough import checks, threads
 from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.influence import Kind, couple
-from convexrough.normal.boxes import Box, Scope
+from convexrough.normal.boxes import Box, Scope, highest_by_rates
 from convexrough.normal.level import Level
 from convexrough.normal.problem import ALL_SHARP, NormalProblem
 from convexrough.normal.proved import proved
@@ -415,8 +415,9 @@ def _other_solutions(level: Level, box: Box) -> tuple[bool, float, bool]:
 
     perturbed = 1.0 + SAFETY + 2.0 * A.entry_error
     a = radii(level.loads.upper)
-    # `overhang` needs weights and the displacement that exactly these weights cause.
-    highest = problem.overhang(level.trial.loads.high, level.trial.product)
+    highest = problem.highest
+    if problem.by_load:
+        highest = highest_by_rates(problem, level.trial.loads.high)
     t = 2.0 / np.pi * _mean(a, radii(problem.bounds(highest)))
     if A.crowding(t) * perturbed <= 1 or A.semidefinite_with(float(t.max(initial=0.0))):
         return none

@@ -322,12 +322,12 @@ class NormalProblem:
     def overhang(self, weights: Array, displacement: Ball) -> Any:
         """An upper bound on D0 at every solution: a number, or (m, 1) for a stack.
 
-        weights : (n,) approximate loads, not negative, not all 0;  displacement : A times weights
+        weights : (n,) not negative, not all 0;  displacement : A times weights
         """
         if not self.by_load:
             return self.highest
         given = self.coefficients, self.offsets - self.offset_errors, self.control.upper
-        return np.minimum(self.highest, approach_bound(weights, displacement.upper, *given))
+        return np.fmin(self.highest, approach_bound(weights, displacement.upper, *given))
 
     def to_scene(self, values: NDArray[Any]) -> Array:
         """(N,) values of the candidates, and 0 for all other asperities of the scene."""

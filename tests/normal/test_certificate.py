@@ -26,6 +26,7 @@ from convexrough.normal.boxes import (
     MARGINS,
     box_of_touching,
     convex_margin,
+    highest_by_rates,
     overlapping_margin,
     overlaps,
     tried,
@@ -507,6 +508,25 @@ def test_poor_loads_of_a_prescribed_total_do_not_exclude_another_solution() -> N
     assert [each.scope for each in found] == ["local"] * 3
     assert found[1].status[13] == found[2].status[14] == "contact"
     assert found[1].status[14] == found[2].status[13] == "open"
+
+
+@pytest.mark.parametrize("make", [scenes.scattered, scenes.on_lattice])
+@pytest.mark.parametrize("crowding", [1.0, 1.2])
+def test_a_prescribed_load_excludes_what_its_approach_excludes(make: Any, crowding: float) -> None:
+    """With the rates dP/dL as weights, the bound on the approach is the approach."""
+    found = []
+    for seed in range(40):
+        scene, approach = make(seed, 40, crowding, 0.5)
+        contact = cr.press(scene, approach=approach)
+        if contact.load and contact.certificate.scope == "global":
+            assert cr.press(scene, load=contact.load).certificate.scope == "global"
+            problem = NormalProblem.assemble(scene, load=contact.load)
+            loads = contact.loads[problem.candidates] / problem.units.force
+            bound = highest_by_rates(problem, loads) * problem.units.length
+            found.append(bound - contact.approach)
+            assert -1e-12 <= found[-1] / problem.units.length < 1e-3
+    assert len(found) > 10
+    assert np.median(found) < 1e-9 * approach
 
 
 def test_no_load_is_proved_on_an_open_asperity() -> None:
