@@ -133,9 +133,9 @@ def tried(problem: NormalProblem, loads: Array, displacement: Ball) -> Box | Non
     box, which contains `loads`; or None. `displacement` (n,) is A times `loads`.
     """
     box = widest(problem, loads, problem.overhang(loads, displacement))
-    if problem.by_load and not box.convexity_number < 1:
-        box = widest(problem, loads, highest_by_rates(problem, loads))
     if not box.convexity_number < 1 and problem.influence.stored:
+        if problem.by_load:
+            box = widest(problem, loads, highest_by_rates(problem, loads))
         margin = convex_margin(problem.influence, box.compliance, MARGINS)
         box = box._replace(convexity_number=1.0 - margin)
     if box.convexity_number < 1:

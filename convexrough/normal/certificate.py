@@ -413,13 +413,20 @@ def _other_solutions(level: Level, box: Box) -> tuple[bool, float, bool]:
     def radii(loads: Array) -> Array:
         return problem.radii(problem.compliance(loads)) * (1 + SAFETY)
 
-    perturbed = 1.0 + SAFETY + 2.0 * A.entry_error
+    perturbed, loads = 1.0 + SAFETY + 2.0 * A.entry_error, level.trial.loads.high
     a = radii(level.loads.upper)
-    highest = problem.highest
-    if problem.by_load:
-        highest = highest_by_rates(problem, level.trial.loads.high)
-    t = 2.0 / np.pi * _mean(a, radii(problem.bounds(highest)))
-    if A.crowding(t) * perturbed <= 1 or A.semidefinite_with(float(t.max(initial=0.0))):
+
+    def excluded(highest: float) -> bool:
+        """True if no other solution has an approach up to this."""
+        t = 2.0 / np.pi * _mean(a, radii(problem.bounds(highest)))
+        return A.crowding(t) * perturbed <= 1 or A.semidefinite_with(float(t.max(initial=0.0)))
+
+    # `overhang` needs weights and the displacement that exactly these weights cause.
+    if excluded(problem.overhang(loads, level.trial.product)):
+        return none
+    # The bound by rates costs more, and is not below the approach.
+    useful = problem.by_load and excluded(float(level.approach.lower))
+    if useful and excluded(highest_by_rates(problem, loads)):
         return none
     crowding = 0.75 * np.pi * (1.0 - SAFETY) - A.crowding(a) * perturbed
     return True, max(crowding, 0.0), bool((a <= ROOMY * A.separations()).all())

@@ -97,8 +97,9 @@ def approach_bound(
 def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -> float:
     """Upper bound [length] on the approach at every solution of total `load` [force].
 
-    It is `approach_bound` with the weights `smooth_loads`. Where contact discs under these would
-    reach their nearest neighbours, smaller loads are the weights, as the bound would be useless.
+    It is `approach_bound` with rates of the loads `smooth_loads` as weights. Where contact discs
+    under these would reach their nearest neighbours, the loads are reduced, as the bound would be
+    useless.
     """
     bound, distances = np.nan, np.hypot(*scene.contact_points.T)
     if scene.curved:
@@ -139,6 +140,7 @@ def _bound_within(
         fitting = np.minimum(weights[which], hertz.load(deepest, coefficients[which]))
         if fitting.any():
             weights[which] = fitting
+    weights = np.cbrt(weights) / coefficients  # rates dP/dL if all indentations change alike
     couplings: list[tuple[Indices, Coupling]] = [(which, sources)]
     if not every:
         others = np.flatnonzero(weights == 0)
