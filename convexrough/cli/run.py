@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from convexrough.atomic import write_text
+from convexrough.atomic import remove_unfinished, write_text
 from convexrough.cli import common
 from convexrough.errors import FileError, WorkerError, blamed_on
 
@@ -177,6 +177,7 @@ def new(scene: Path) -> int:
     if scene.exists() or scene.is_symlink():
         raise FileError(f"{scene}: exists already; name another file")
     write_text(scene, template)
+    remove_unfinished(scene.parent)
     click.echo(f"written  {scene}")
     return common.DONE
 

@@ -62,6 +62,9 @@ def test_what_a_killed_process_left_is_removed_by_the_next(tmp_path: Path, comma
     left.write_text("{")
     assert command("run", "a.toml", "--out", "out", "--no-figures").status == 0  # type: ignore
     assert not left.exists()
+    left.write_text("{")
+    assert command("new", "out/b.toml").status == 0  # type: ignore
+    assert not left.exists()
     kept = [folder / f".a.{os.getpid()}.unfinished", folder / ".a.1.unfinished.txt", folder / ".a"]
     for path in kept:
         path.write_text("mine")
