@@ -100,7 +100,10 @@ def array(
     sign : required sign: "" (any), "positive" or "not negative"
     smallest : smallest allowed absolute value of values other than 0
     one  : noun for messages such as "one per asperity"
+
+    A pandas object whose index `is_permuted` is refused.
     """
+    in_order(what, values)
     vector = numbers(what, values)
     if vector.ndim == 0 and length is not None:
         vector = even(float(vector), length)
@@ -256,7 +259,8 @@ def nearest(name: str, valid: Iterable[str]) -> str:
 
 
 def _number(what: str, value: float | None, expected: str) -> float:
-    if value is None or isinstance(value, (bool, str, bytes)):  # float() accepts text
+    refused = bool, np.bool_, str, bytes, np.complexfloating  # which float() accepts
+    if value is None or isinstance(value, refused):
         raise InputError(what, found=repr(value), expected=expected)
     try:
         return float(value)

@@ -110,7 +110,6 @@ def verify_shear(
     """
     checks.instance("contact", contact, Contact)
     within = tolerance("within", within)
-    checks.in_order("forces", forces)
     given = checks.array("forces", forces, length=len(contact.scene))
     state = shear(contact, force=checks.finite("force", force))
     if sliding is None:

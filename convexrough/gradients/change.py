@@ -56,6 +56,9 @@ class Direction(Record):
     force: float = 0.0
 
     def __post_init__(self) -> None:
+        for name in ("heights", "tip_radii", "positions"):
+            checks.in_order(name, given := getattr(self, name))
+            object.__setattr__(self, name, frozen(checks.numbers(name, given)))
         for name in ("load", "approach"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, checks.finite(name, getattr(self, name)))

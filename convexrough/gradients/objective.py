@@ -73,7 +73,7 @@ class Objective(Record):
     def __post_init__(self) -> None:
         checks.instance("scene", self.scene, Scene)
         checks.exactly_one("load", self.load, "approach", self.approach)
-        if self.of not in NUMBERS:
+        if not isinstance(self.of, str) or self.of not in NUMBERS:
             expected = f"one of: {', '.join(NUMBERS)}"
             raise InputError("of", found=repr(self.of), expected=expected)
         required = NUMBERS[self.of]
@@ -86,14 +86,11 @@ class Objective(Record):
             if (given := getattr(self, name)) is not None:
                 object.__setattr__(self, name, checks.finite(name, given))
         by = (self.by,) if isinstance(self.by, str) else self.by
-        try:
-            by = tuple(by)
-            once = 0 < len(by) == len(set(by))
-        except TypeError:
-            once = False
-        if not once:
+        ordered = isinstance(by, (list, tuple)) and all(isinstance(name, str) for name in by)
+        if not (ordered and 0 < len(by) == len({*by})):
             expected = "a list of names of parameters, each once"
-            raise InputError("by", found=repr(self.by)[:60], expected=expected)
+            raise InputError("by", found=checks.shown(self.by), expected=expected)
+        by = tuple(by)
         object.__setattr__(self, "by", by)
         if "sphere_radius" in by:
             sphere_radius(self.scene.sphere_radius, "by sphere_radius")
@@ -158,8 +155,9 @@ class Objective(Record):
     def to_jax(self) -> Callable[[Any], Any]:
         """The result as a function for jax.grad, jax.jit and jax.vmap, without second derivatives.
 
-        The result is computed outside of jax in float64. Without the option `jax_enable_x64`, value
-        and gradient are rounded to float32. Raises ExtraError if jax is not installed.
+        The result is computed outside of jax in float64. Without the option `jax_enable_x64`, jax
+        rounds the parameters, the value and the gradient to float32. Raises ExtraError if jax is
+        not installed.
         """
         jax = needed("jax")
 
@@ -180,26 +178,38 @@ class Objective(Record):
     def to_torch(self) -> Callable[[Any], Any]:
         """The result as a function for torch that supports `backward`, without second derivatives.
 
-        The result is computed in float64 on the CPU, and rounded to the type of the argument.
-        Raises ExtraError if torch is not installed.
+        The result is computed in float64 on the CPU, and rounded to the type of the argument, a
+        tensor of floating-point numbers. Raises ExtraError if torch is not installed.
         """
         torch, both = needed("torch"), self
 
         class Number(torch.autograd.Function):  # type: ignore[misc, name-defined]
             @staticmethod
             def forward(ctx: Any, x: Any) -> Any:
-                value, slopes = both(x.detach().cpu().numpy().astype(np.float64))
-                at = torch.as_tensor(slopes.copy(), dtype=x.dtype, device=x.device)
-                ctx.save_for_backward(at)
+                value, slopes = both(x.detach().double().cpu().numpy())
+                ctx.save_for_backward(x, torch.as_tensor(slopes.copy()).to(x))
                 return x.new_tensor(value)
 
             @staticmethod
-            @torch.autograd.function.once_differentiable  # type: ignore[untyped-decorator]
             def backward(ctx: Any, weight: Any) -> Any:
-                return weight * ctx.saved_tensors[0]
+                return weight * Slopes.apply(*ctx.saved_tensors)
 
-        found: Callable[[Any], Any] = Number.apply
-        return found
+        class Slopes(torch.autograd.Function):  # type: ignore[misc, name-defined]
+            @staticmethod
+            def forward(ctx: Any, x: Any, slopes: Any) -> Any:
+                return slopes.clone()
+
+            @staticmethod
+            def backward(ctx: Any, *weights: Any) -> Any:
+                raise RuntimeError("an Objective has no second derivatives")
+
+        def number(x: Any) -> Any:
+            if not (isinstance(x, torch.Tensor) and x.is_floating_point()):
+                expected = "a tensor of floating-point numbers"
+                raise InputError("parameters", found=checks.shown(x), expected=expected)
+            return Number.apply(x)
+
+        return number
 
     def to_autograd(self) -> Callable[[Any], Any]:
         """The result as a function for `autograd.grad` (numpy), without second derivatives.
@@ -213,7 +223,7 @@ class Objective(Record):
             return self(np.frombuffer(point))
 
         def both(x: Any) -> tuple[float, Array]:
-            return at(np.asarray(x, dtype=np.float64).tobytes())
+            return at(checks.array("parameters", x).tobytes())
 
         found: Callable[[Any], Any] = extend.primitive(lambda x: both(x)[0])
         extend.defvjp(found, lambda value, x: lambda weight: weight * both(x)[1])

@@ -235,6 +235,8 @@ def cycle_gradient(cycle: Cycle, *, holding: Holding | None = None) -> Gradient:
         Part(low, energy=-weight, approach=weight * T * -0.5, moves=moves),
     ]
     W = weight * (top.energy - low.energy - T * mean)
+    if cycle.loss_error < float(W.error):  # at small amplitudes
+        W = Ball.around(cycle.loss, cycle.loss_error)
     explicit = at_fixed_levels(known, loss=W)
     for name in ("maximum", "minimum", "friction"):  # dT = dP - dL
         explicit[name] = explicit.get(name, ZERO) + weight * mean * moves[name]

@@ -65,7 +65,9 @@ Phase = Annotated[float, expected(*checks.phase)]
 ALSO_ONE = pydantic.BeforeValidator(lambda it: [it] if isinstance(it, (int, float)) else it)
 Shares = Annotated[list[Share], expected("a list of numbers from 0 to 1", bool), ALSO_ONE]
 Fractions = Annotated[list[Fraction], expected("a list of numbers from -1 to 1", bool), ALSO_ONE]
-Whole = Annotated[int, expected("a whole number that is not negative", lambda value: value >= 0)]
+Whole = Annotated[
+    int, expected("a whole number that is not negative", lambda value: 0 <= value < 2**63)
+]
 Text = Annotated[str, expected("text in quotes", bool)]
 Switch = Annotated[bool, expected("true or false")]
 TipRadius = Annotated[Annotated[Positive, _ONE] | Annotated[list[Positive], _LIST], _EITHER]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -45,6 +46,10 @@ class Asperities(Record):
     ) -> None:
         points = _points(positions)
         checks.same_index(positions=positions, tip_radii=tip_radii, heights=heights)
+        if hasattr(positions, "iloc"):  # any index will do, as it is that of all
+            tip_radii, heights = (
+                np.asarray(each) if hasattr(each, "iloc") else each for each in (tip_radii, heights)
+            )
         self._set(points, tip_radii, heights)
         self.layout  # noqa: B018, refuses two asperities at one place
 
@@ -103,6 +108,9 @@ class Asperities(Record):
 
     def __len__(self) -> int:
         return len(self.positions)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return super().__getstate__() | {"layout": self.layout}
 
     @cached_property
     def layout(self) -> Layout:

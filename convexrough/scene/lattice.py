@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.arrays import Array
+from convexrough.arrays import Array, frozen
 from convexrough.cached import Cached
 from convexrough.checks import SMALLEST
 
@@ -41,6 +41,10 @@ class Lattice(Cached):
     #: If `shrunk` made this lattice, its factors along x and y, and the basis before shrinking.
     shrink: tuple[Fraction, Fraction] = (Fraction(1), Fraction(1))
     unshrunk: Array | None = None
+
+    def __post_init__(self) -> None:
+        frozen(self.origin)
+        frozen(self.basis)
 
     def shrunk(self, along_x: Fraction, along_y: Fraction) -> Lattice | None:
         """The lattice of points whose coordinates are multiplied by these factors of at most 1.

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,9 +91,13 @@ class Layout(Cached):
             return cls(points)
         site_error = MADE_SITE_ERROR * float(np.abs(points).max())
         lattice = Lattice(np.zeros(2), basis, site_error)
-        layout = cls(points, (lattice, sites), spacing * np.sqrt(others), exact)
-        layout.__dict__["order"] = order
+        layout = cls(points, (lattice, frozen(sites)), spacing * np.sqrt(others), exact)
+        layout.__dict__["order"] = frozen(order)
         return layout
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields only: what follows from them is computed again."""
+        return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @cached_property
     def lattice(self) -> Lattice | None:

@@ -197,7 +197,7 @@ class Scene(Record):
         0.01
         """
         return reach(
-            approach,
+            checks.finite("approach", approach),
             sphere_radius=self.sphere_radius,
             tip_radius=float(self.asperities.tip_radii.max()),
             height=float(self.asperities.heights.max()),

@@ -189,7 +189,7 @@ class Summits(Table, Asperities, Plottable):
             found = f"none of {origin.maxima:,} maxima is left"
             raise InputError("summits", found=found, expected="at least one: prune less")
         columns = self.__getstate__()
-        del columns["origin"]
+        del columns["origin"], columns["layout"]
         return Summits(**{name: values[keep] for name, values in columns.items()}, origin=origin)
 
 

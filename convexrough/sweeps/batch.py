@@ -11,9 +11,9 @@ from typing import Any, TypeAlias
 import numpy as np
 import scipy
 
-from convexrough.errors import InputError, SceneFileError
+from convexrough.errors import FileError, InputError, SceneFileError
 from convexrough.run.asperity_file import read_summits
-from convexrough.run.scene_file import Task, regular, tasks_of
+from convexrough.run.scene_file import Task, digest, regular, tasks_of
 from convexrough.run.stage import Columns as Columns
 from convexrough.run.study import validate
 from convexrough.sweeps.grid import Grid, table_in, with_values
@@ -31,11 +31,15 @@ KEPT, NO_SEED = 8, -1
 
 @dataclass(frozen=True)
 class Tables:
-    """The scenes of the sweep file at `path`; `tables` is this file except its table [sweep]."""
+    """The scenes of the sweep file at `path`; `tables` is this file except its table [sweep].
+
+    inputs : the digests of the files of asperities, by name
+    """
 
     grid: Grid
     tables: Mapping[str, Any]
     path: Path
+    inputs: Mapping[str, str]
 
     @property
     def count(self) -> int:
@@ -60,7 +64,13 @@ class Tables:
         return self
 
     def opened(self) -> Callable[[int], Task]:
-        """A function from numbers to scenes; consecutive scenes share common data."""
+        """A function from numbers to scenes; consecutive scenes share common data.
+
+        Raises FileError if a file of asperities is not as it was when the sweep was planned.
+        """
+        for name, known in self.inputs.items():
+            if digest(self.path.parent / name) != known:
+                raise FileError(f"{self.path.parent / name}: changed since the sweep began")
         summits, lattice = lru_cache(KEPT)(read_summits), lru_cache(KEPT)(regular)
 
         @lru_cache(1)

@@ -176,9 +176,11 @@ def make_folder(path: Path, manifest: Mapping[str, Any], *, overwrite: bool = Fa
                 (path / PARTS).mkdir(exist_ok=True)
                 write_text(path / MANIFEST, to_json(manifest) + "\n")
         folder = folder_of(path, manifest)
-        for file in (path / PARTS).glob(f"*{'[0-9]' * 12}-{'[0-9a-f]' * 12}.parquet*"):
-            if folder.ending not in file.name:  # of another sweep
-                file.unlink(missing_ok=True)
+        name = f"{'[0-9]' * 12}-{'[0-9a-f]' * 12}.parquet"
+        for pattern in (name, f".{name}.*.unfinished"):
+            for file in (path / PARTS).glob(pattern):
+                if folder.ending not in file.name:  # of another sweep
+                    file.unlink(missing_ok=True)
     return folder
 
 

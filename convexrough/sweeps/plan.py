@@ -90,7 +90,9 @@ def plan_of(
     said = {"source": str(path), "text": text, "inputs": inputs}
     lists = [list(getattr(grid, where).items()) for where in WHERE]  # in order
     given = {"tables": tables, "swept": lists, "seeds": grid.seeds, "inputs": inputs}
-    return _planned(Tables(grid, tables, path), grid.measure, said, study.units.names, **given)
+    return _planned(
+        Tables(grid, tables, path, inputs), grid.measure, said, study.units.names, **given
+    )
 
 
 def _nothing_random(contents: Mapping[str, Any]) -> Iterator[str]:
@@ -150,8 +152,10 @@ def plan_of_scenes(
     controls = checks.array(name, control, length=len(scenes), one="scene").tolist()
     expected = 'a list of numbers of a summary, such as ["load"]'
     checks.sequence("measure", measure, expected)
-    if not measure:
-        raise InputError("measure", found=measure, expected=expected)
+    measures = [] if measure is None else [*measure]
+    if not measures or not all(isinstance(name, str) for name in measures):
+        raise InputError("measure", found=checks.shown(measures), expected=expected)
+    measures = list(dict.fromkeys(measures))
     content = hashlib.sha256()
     for scene in scenes:
         layout, material = scene.asperities, scene.material
@@ -166,7 +170,7 @@ def plan_of_scenes(
         for number, (scene, control) in enumerate(zip(scenes, controls, strict=True))
     }
     said = {"source": "scenes made in Python"}
-    return _planned(Tasks(tasks, name), measure, said, UnitNames(), **given)
+    return _planned(Tasks(tasks, name), measures, said, UnitNames(), **given)
 
 
 def _stages(cycle: Sequence[float], shear: Sequence[float]) -> Stages:
@@ -216,6 +220,7 @@ def _planned(
     inputs = hashlib.sha256(json.dumps(contents, sort_keys=True, default=repr).encode())
     grid = source.grid if isinstance(source, Tables) else None
     labels = list(source.labels(range(0)))
+    columns = tuple(it for it in columns if it.name not in labels)  # a swept key has a column
     numbers = {key: key for key in labels} | {it.name: it.number for it in columns}
     used = {"normal", *(column.stage for column in columns)}
     own_loads = []  # tables with loads of their own that do not vary, although [normal] does

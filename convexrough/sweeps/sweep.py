@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from convexrough import checks
+from convexrough.arrays import frozen
 from convexrough.errors import InputError, WorkerError, needed
 from convexrough.progress import LOGGER
 from convexrough.scene.scene import Scene
@@ -40,6 +41,9 @@ MOST = 10**8
 #: Largest numbers of batches submitted at a time to a given executor, and for each local process;
 #: and of batches that may be lost because their workers die.
 AT_ONCE, EACH, MOST_LOST = 1000, 2, 64
+
+#: Held while `__main__` is replaced.
+SHELTER = threading.Lock()
 
 
 def sweep(
@@ -75,8 +79,8 @@ def sweep(
     overwrite : first remove another sweep from the folder, or earlier rows of these scenes
     part     : (k, n): compute only the k-th of n shares of the scenes, with k from 1 to n
 
-    The table is the same, bit for bit, for any executor, any order of computation and any number of
-    interruptions. In the row of a failed scene, `message` states the reason.
+    The table, except `seconds`, is the same, bit for bit, for any executor, any order of computation
+    and any number of interruptions. In the row of a failed scene, `message` states the reason.
 
     Raises FileError and InputError for wrong input, before the sweep begins; WorkerError if workers
     died twice while computing the same scenes, if workers died too often, if the executor is
@@ -93,10 +97,12 @@ def sweep(
     if out is None and (resume or overwrite):
         expected = "the folder of an earlier sweep, as resume and overwrite need one"
         raise InputError("out", found="none", expected=expected)
-    given = {"approach": approach, "load": load, "cycle": cycle or None, "shear": shear or None}
+    given: dict[str, Any] = dict(approach=approach, load=load, cycle=cycle, shear=shear)
     if not isinstance(what, (str, os.PathLike, Mapping)):
         plan = plan_of_scenes(what, measure, approach, load, cycle, shear)
-    elif name := next((name for name, value in given.items() if value is not None), ""):
+    elif name := next(
+        (name for name, value in given.items() if np.size(value) and value is not None), ""
+    ):
         raise InputError(name, found="given", expected="none: the sweep tables state it")
     else:
         plan = plan_of(what, measure=measure)
@@ -141,7 +147,7 @@ def run(
     if folder is not None:
         return SweepTable(folder.manifest, folder), did
     parts.sort(key=lambda each: each["scene"][0] if len(each["scene"]) else -1)
-    rows = {name: np.concatenate([each[name] for each in parts]) for name in parts[0]}
+    rows = {name: frozen(np.concatenate([each[name] for each in parts])) for name in parts[0]}
     return SweepTable(plan.manifest, None, rows), did
 
 
@@ -149,7 +155,7 @@ def _share(plan: Plan, part: tuple[int, int] | None) -> list[range]:
     """The parts (ranges of scenes) in share k of n shares, for `part` = (k, n); all for None."""
     if part is not None and not (isinstance(part, tuple) and len(part) == 2):
         raise InputError("part", found=repr(part), expected="(K, N) with K from 1 to N")
-    k, n = part or (1, 1)
+    k, n = (checks.whole("part", each) for each in part or (1, 1))
     if not 1 <= k <= n:
         raise InputError("part", found=f"{k}/{n}", expected="K/N with K from 1 to N")
     size = plan.manifest["batch"]
@@ -270,16 +276,17 @@ def _end_with(pipe: Any) -> None:
 @contextmanager
 def _sheltered() -> Iterator[None]:
     """A context in which new processes do not run the user's script, and ignore interrupts."""
-    script = sys.modules["__main__"]
-    sys.modules["__main__"] = ModuleType("__main__")
-    masks = hasattr(signal, "pthread_sigmask")  # false on Windows
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if masks else set()
-    try:
-        yield
-    finally:
-        if masks:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        sys.modules["__main__"] = script
+    with SHELTER:
+        script = sys.modules["__main__"]
+        sys.modules["__main__"] = ModuleType("__main__")
+        masks = hasattr(signal, "pthread_sigmask")  # false on Windows
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if masks else set()
+        try:
+            yield
+        finally:
+            if masks:
+                signal.pthread_sigmask(signal.SIG_SETMASK, before)
+            sys.modules["__main__"] = script
 
 
 @contextmanager

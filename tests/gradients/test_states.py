@@ -578,6 +578,10 @@ def test_in_other_packages(package: str) -> None:
         (2.0 * function(given)).backward()
         assert function(given).item() == value
         np.testing.assert_array_equal(given.grad.numpy(), 2.0 * slopes)
+        with pytest.raises(RuntimeError, match="no second derivatives"):
+            library.autograd.functional.hessian(function, given)
+        with pytest.raises(cr.InputError, match="expected a tensor of floating-point numbers"):
+            function(given.detach().to(library.int64))
         return
     if package == "jax":
         library.config.update("jax_enable_x64", True)
@@ -590,3 +594,13 @@ def test_in_other_packages(package: str) -> None:
     np.testing.assert_array_equal(library.grad(function)(x), slopes)
     squared = library.grad(lambda y: function(y) ** 2)(x)
     np.testing.assert_allclose(squared, 2 * value * slopes, rtol=1e-14)
+    if package == "autograd":
+        with pytest.raises(cr.InputError, match="parameters: found shape"):
+            function(x[:, None])
+
+
+def test_an_objective_of_a_small_force_is_the_loss() -> None:
+    """The difference of two energies loses digits; the bound of the loss tells."""
+    objective = of_loss(("friction",), force=1e-11 * FRICTION * 3.6e-7)
+    cycle = cr.cycle(cr.press(objective.scene, load=3.6e-7), maximum=objective.force)
+    assert objective(objective.start)[0] == pytest.approx(cycle.loss, rel=1e-6)

@@ -4,6 +4,7 @@ import itertools
 import json
 import logging
 import math
+import pickle
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +17,7 @@ from scene_files import SMALL, numbers, same, scene_text, sweeping, swept, table
 from scenes import hexagonal, paper
 
 import convexrough as cr
+from convexrough.sweeps.batch import compute
 from convexrough.sweeps.grid import Grid, with_values
 from convexrough.sweeps.measures import CYCLE, NORMAL, measured
 from convexrough.sweeps.plan import plan_of
@@ -127,6 +129,36 @@ def test_scenes_made_in_python() -> None:
         assert row == {"approach": contact.approach, "loss_0.3": loss}
 
 
+def test_scenes_of_a_made_lattice_are_the_same_in_other_processes() -> None:
+    """The layout of the points goes with them, so that rounding is the same."""
+    scene = hexagonal(0.0012, 0.01, height_std=1e-6, seed=1)
+    contact, again = (
+        cr.press(each, load=1e-7) for each in (scene, pickle.loads(pickle.dumps(scene)))
+    )
+    assert len(scene) > 200
+    assert contact.influence == again.influence
+    assert again.scene.lattice.basis.tolist() == scene.lattice.basis.tolist()
+    assert again.certificate.load_errors.tolist() == contact.certificate.load_errors.tolist()
+
+
+def test_a_swept_key_that_is_measured_has_one_column() -> None:
+    scenes, asked = [paper()] * 2, ("load", "normal.load", "load")
+    table = swept(scenes, load=[1e-7, 2e-7], measure=(name for name in asked))
+    assert table.columns == ["scene", "normal.load", "seed", "status", "message", "load"]
+
+
+def test_a_file_that_changes_during_a_sweep(tmp_path: Path) -> None:
+    """No table has rows of two surfaces."""
+    (tmp_path / "a.csv").write_text("x,y,tip_radius\n0,0,1\n1,0,1\n")
+    contents = sweeping(over={"normal.load": [1e-7, 2e-7]})
+    contents["asperities"] = {"pattern": "file", "path": "a.csv"}
+    (tmp_path / "a.toml").write_text(toml(contents))
+    plan = plan_of(tmp_path / "a.toml")
+    (tmp_path / "a.csv").write_text("x,y,tip_radius\n0,0,1\n1,0,2\n")
+    with pytest.raises(cr.FileError, match=r"a\.csv: changed since the sweep began"):
+        compute(plan.batch(range(2)))
+
+
 def failing(over: dict[str, Any]) -> dict[str, Any]:
     """Radii of 61 asperities, for scenes of 61 and of 19."""
     found = sweeping(over=over | {"asperities.within": [0.0102, 0.0052]})
@@ -203,6 +235,8 @@ def test_what_is_refused(whole: cr.SweepTable) -> None:
         (lambda: swept([paper()], load=1e-7, cycle=[(0.5, 0.1)], measure=["loss"]), "cycle: "),
         (lambda: swept(SMALL, resume=True), "out: found none, expected the folder of"),
         (lambda: swept(SMALL, out="b", resume=True, overwrite=True), "overwrite: found both"),
+        (lambda: swept(SMALL, part=(1.5, 2)), "part: found 1.5, expected a whole number"),
+        (lambda: swept([paper()], load=1e-7, measure=[1]), r"measure: found \[1\], expected"),
         (lambda: cr.open_sweep("x" * 300), "cannot be read: File name too long"),
     ):
         with pytest.raises((cr.InputError, cr.FileError), match=said):
@@ -292,9 +326,12 @@ def test_a_folder_of_another_sweep_is_refused(folder: Path) -> None:
     other = tables(sweep={"seeds": 1})
     (folder / "notes.txt").write_text("mine")
     (folder / "parts/7.parquet.bak").write_text("mine")
+    (part,) = list((folder / "parts").glob("0*0-*"))[:1]
+    kept = part.rename(part.with_name(f"{part.name}.bak"))
     replaced = swept(other, out=folder, overwrite=True)
     assert same(replaced, swept(other))
     assert (folder / "notes.txt").read_text() == (folder / "parts/7.parquet.bak").read_text()
+    assert kept.exists()
 
 
 def test_nothing_of_a_folder_that_is_no_sweep_is_removed(tmp_path: Path) -> None:
