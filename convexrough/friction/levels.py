@@ -24,7 +24,7 @@ from convexrough.arithmetic.balls import TINY, Ball, of_rows
 from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair
 from convexrough.arrays import Array, Indices, among_zeros, frozen
 from convexrough.contact import Contact, levels_of
-from convexrough.errors import InputError
+from convexrough.errors import InputError, ProofError
 from convexrough.friction.order import MOST, Order, order_between
 from convexrough.influence.coupling import Coupling
 from convexrough.normal.level import Level, Rows, rows_of
@@ -77,11 +77,17 @@ class FrictionLevels:
         return [*self._named, self.load]
 
     def at(self, load: Fraction) -> Level:
-        """The level at a load from 0 to P."""
+        """The level at a load from 0 to P. Raises ProofError if the load may be 0 or less, but is
+        not named 0."""
         if load == self.load:
             return self.top
         if load not in self._named:
             ball = self._balls([load])[0] if load else Ball.exact(0.0)
+            if load and not ball.positive:
+                raise ProofError(
+                    "the shear force is so near f P that gross sliding is not excluded, as the "
+                    "load P is known up to rounding only: prescribe P, or the force f P"
+                )
             self._named[load] = self._levels.at(ball)
         return self._named[load]
 

@@ -180,7 +180,8 @@ def shear(
     displacement that is larger by at most 1e-14 of it.
 
     Raises InputError if the scene has no friction, if |Q| exceeds f P, or if |displacement| exceeds
-    that at which gross sliding starts; SolverError if a normal problem is not solved.
+    that at which gross sliding starts; SolverError if a normal problem is not solved; ProofError if
+    the approach is prescribed, and the force differs from f P by less than the error bound of f P.
 
     >>> state = cr.shear(contact, force=0.25 * contact.load)
     >>> print((state.status == "sliding").sum(), f"{state.displacement:.3g}")

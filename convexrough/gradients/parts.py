@@ -219,7 +219,9 @@ class Geometry:
             return self._in_balls(loads, which)
         A, found = self.problem.influence.restricted(which), []
         for P in loads:
-            slopes, errors = A.slopes(P.value), A.falloff(P.error, 2) * A.scale
+            slopes, errors = A.slopes(P.value), np.full(len(which), np.inf)
+            if np.isfinite(P.error).all():
+                errors = A.falloff(P.error, 2) * A.scale
             found.append(Ball.around(slopes.mid, slopes.radius + errors[:, None] * (1 + SAFETY)))
         return found
 

@@ -79,7 +79,7 @@ def sweep(
     overwrite : first remove another sweep from the folder, or earlier rows of these scenes
     part     : (k, n): compute only the k-th of n shares of the scenes, with k from 1 to n
 
-    The table, except `seconds`, is the same, bit for bit, for any executor, any order of computation
+    The table, except `seconds`, is the same, bit for bit, for any executor, any order of computing
     and any number of interruptions. In the row of a failed scene, `message` states the reason.
 
     Raises FileError and InputError for wrong input, before the sweep begins; WorkerError if workers

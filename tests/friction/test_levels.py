@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from fractions import Fraction
 from itertools import product
 from typing import Any
 
@@ -20,6 +21,7 @@ from status_audit import ATTACKS, attack
 import convexrough as cr
 from convexrough.arithmetic.balls import Ball
 from convexrough.contact import levels_of
+from convexrough.friction.levels import FrictionLevels
 
 FRACTIONS = [1e-9, 1e-6, 1e-3, 0.1, 0.35, 0.37, 0.5, 0.7, 0.9, 0.999]
 NAMES = ["paper", "rough"]
@@ -113,6 +115,14 @@ def test_zero_and_the_limit() -> None:
     back, forth = (cr.shear(contact, force=sign * 0.3 * limit) for sign in (-1, 1))
     assert (back.forces == -forth.forces).all()
     assert back.displacement == -forth.displacement
+
+
+def test_a_force_that_may_be_the_limit_of_a_rounded_load() -> None:
+    levels = pressed("rough").cached(FrictionLevels)
+    P = sum(Fraction(float(part)) for part in levels.top.load.mid) * Fraction(levels.units.force)
+    assert 0 < levels.load - P < 1e-16 * levels.load
+    with pytest.raises(cr.ProofError, match="so near f P that gross sliding is not excluded"):
+        levels.at(levels.load - P)
 
 
 def test_levels_of_a_fine_lattice_are_proved_where_the_bound_of_a_rim_is_tiny() -> None:

@@ -110,6 +110,19 @@ def test_newton_converges_from_any_start(sampled: Case, seed: int, size: float) 
         assert_allclose(again.loads, contact.loads, rtol=1e-9, atol=1e-12 * contact.loads.max())
 
 
+@pytest.mark.parametrize("size", [1e-2, 1e-3])
+def test_newton_converges_where_a_cluster_is_far_smaller_than_the_scene(size: float) -> None:
+    """The preconditioner, which averages over blocks, says nothing about such a cluster."""
+    field = cr.Asperities.hexagonal(spacing=0.0025, tip_radius=0.02, within=0.045).positions
+    points = np.vstack((field, size * field + [0.3, 0.1]))
+    tips = np.repeat([0.02, 0.02 * size], len(field))
+    scene = cr.Scene(np.inf, cr.Asperities(points, tips), scenes.MATERIAL)
+    contact = cr.press(scene, approach=1e-6 * size)
+    assert contact.influence == "scattered"
+    assert contact.iterations < 20
+    assert contact.certificate.scope == "global"
+
+
 #: Dense alone where the points are scattered; on a lattice, every operator.
 CROWDED = [(scenes.scattered, "dense"), *((scenes.on_lattice, kind) for kind in scenes.OPERATORS)]
 
