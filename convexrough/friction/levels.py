@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -22,11 +21,10 @@ from numpy.typing import NDArray
 from convexrough import checks
 from convexrough.arithmetic.balls import TINY, Ball, of_rows
 from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair
-from convexrough.arrays import Array, Indices, among_zeros, frozen
+from convexrough.arrays import Array, among_zeros, frozen
 from convexrough.contact import Contact, levels_of
 from convexrough.errors import InputError, ProofError
 from convexrough.friction.order import MOST, Order, order_between
-from convexrough.influence.coupling import Coupling
 from convexrough.normal.level import Level, Rows, rows_of
 from convexrough.roundoff import AT_THE_END, ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
@@ -145,30 +143,14 @@ class FrictionLevels:
     def indentations(self, level: Level) -> Ball:
         """(N,) the indentations n_i of a level; in float64 for asperities that cannot touch."""
         known: Ball = of_rows(self.to_scene, level.indentation)
-        others, unit = self._others, self.units.length
-        if len(others) == 0:
-            return known
-        approach = float(level.approach.value)
-        n = approach + self.scene.offsets[others] / unit
-        off = self.scene.offset_errors[others] / unit + float(level.approach.error)
-        off += 4 * ROUNDOFF * (np.abs(n) + abs(approach))
-        if level.trial is not None:
-            loads = level.trial.loads.high
-            coupled = self._beyond.apply(loads)
-            n -= coupled
-            off += self._beyond.rounding(loads).of(coupled) + 4 * ROUNDOFF * coupled
-            off += level.moves(self._beyond)
-        known.mid.high[others], known.radius[others] = n, off
+        problem, state = self._levels.problem, level.trial
+        loads = np.zeros(len(problem)) if state is None else state.loads.high
+        n, off = problem.beyond(loads, float(level.approach.value))
+        if len(n):
+            others, coupling = problem.screened
+            off += float(level.approach.error) + (0.0 if state is None else level.moves(coupling))
+            known.mid.high[others], known.radius[others] = n, off
         return Ball(known.mid, known.radius * (1 + SAFETY))
-
-    @cached_property
-    def _others(self) -> Indices:
-        """Indices of the asperities that cannot touch at loads up to P."""
-        return np.setdiff1d(np.arange(len(self.scene)), self.candidates, assume_unique=True)
-
-    @cached_property
-    def _beyond(self) -> Coupling:
-        return self._levels.problem.influence.onto(self.scene.contact_points[self._others])
 
     def to_scene(self, values: NDArray[Any]) -> NDArray[Any]:
         """(..., N) the values (..., n) of the candidates, with 0 for all other asperities."""

@@ -298,43 +298,35 @@ class Depths:
     def __call__(self) -> tuple[Array, ...]:
         """(N,) [length] indentations of all asperities of the scene, and their error bounds."""
         with threads.one_where(4 * len(self.problem)):
-            beyond = self.of_screened(which := self.screened)
+            beyond = self.of_screened
         whole = tuple(self.problem.to_scene(each) for each in (self.value, self.error))
         for each, outer in zip(whole, beyond, strict=True):
-            each[which] = outer
+            each[self.problem.screened[0]] = outer
             each *= self.problem.units.length
         return whole
 
-    @property
-    def screened(self) -> Indices:
-        """Indices of the asperities that cannot touch: approach plus offset is at most 0 in every
-        solution.
-        """
-        left = np.ones(len(self.problem.scene), dtype=bool)
-        left[self.problem.candidates] = False
-        return left.nonzero()[0]
-
-    def of_screened(self, which: Indices) -> tuple[Array, Array]:
-        """(m,) indentations of these asperities, which cannot touch, and their error bounds."""
-        if len(which) == 0:
-            return np.zeros(0), np.zeros(0)
-        scene, length = self.problem.scene, self.problem.units.length
-        coupling = self.problem.influence.onto(scene.contact_points[which])
-        product, offsets = coupling.apply(self.loads), scene.offsets[which] / length
-        errors = coupling.rounding(self.loads).of(product) + scene.offset_errors[which] / length
-        errors += 16 * ROUNDOFF * (np.abs(product) + np.abs(offsets) + abs(self.approach))
-        moved = coupling.apply(self.moved)
-        errors += self.shift + (moved + coupling.rounding(self.moved).of(moved))
-        return self.approach + offsets - product, errors * (1 + SAFETY)
+    @cached_property
+    def of_screened(self) -> tuple[Array, Array]:
+        """(m,) indentations of the asperities `screened`, and their error bounds."""
+        n, errors = self.problem.beyond(self.loads, self.approach)
+        if len(n):
+            coupling = self.problem.screened[1]
+            moved = coupling.apply(self.moved)
+            errors += self.shift + (moved + coupling.rounding(self.moved).of(moved))
+        return n, errors * (1 + SAFETY)
 
     def codes(self) -> NDArray[np.int8]:
         """(N,) the codes of statuses that follow from the indentations alone."""
         codes = np.where(self.problem.to_scene(self.value < -self.error), np.int8(OPEN), np.int8(0))
-        which = self.screened
-        below = (self.problem.scene.offsets[which] != 0) | (self.problem.highest != 0)
-        codes[which[below]] = OPEN
-        n, errors = self.of_screened(level := which[~below])  # without load they are not displaced
-        codes[level[n < -errors]] = OPEN
+        left = np.ones(len(codes), dtype=bool)
+        left[self.problem.candidates] = False
+        # Asperities with a negative sum of approach and offset are open; others with the sum 0 are
+        # if a load displaces them.
+        level = left & (self.problem.scene.offsets == 0) & (self.problem.highest == 0)
+        codes[left & ~level] = OPEN
+        if level.any():
+            n, errors = self.of_screened
+            codes[self.problem.screened[0][n < -errors]] = OPEN
         return codes
 
 
@@ -392,7 +384,7 @@ def _screened_energy(depths: Depths, loads: Array) -> float:
     moved = coupling.apply(s)
     moved += coupling.rounding(s).of(moved)
     local = 0.6 * hertz.indentation(s, coefficients * problem.units.local)
-    indentation, errors = depths.of_screened(which)
+    indentation, errors = (each[screened[problem.screened[0]]] for each in depths.of_screened)
     energy = float(s @ (local + (errors - indentation) + 0.5 * np.maximum(moved, 0.0))) * (
         1 + SAFETY
     )

@@ -27,6 +27,7 @@ from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices, among_zeros, evenly, frozen, largest, taken
 from convexrough.convex.newton_step import correct
 from convexrough.influence import Influence, Kind, couple
+from convexrough.influence.coupling import Coupling
 from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.lattice import LatticeInfluence
 from convexrough.influence.shells import shells
@@ -123,14 +124,38 @@ class NormalProblem:
         other = replace(self, control=control, by_load=by_load, sharp=True)
         for name in ("exact", "row_norm", "largest_entry"):
             other.__dict__[name] = getattr(self, name)
-        if "squares" in self.__dict__:
-            other.__dict__["squares"] = self.squares
+        for name in ("squares", "screened"):
+            if name in self.__dict__:
+                other.__dict__[name] = getattr(self, name)
         return other
 
     @cached_property
     def squares(self) -> Array:
         """(n,) [length^2] squared distances of the summits from the axis."""
         return frozen(self.scene.asperities.distances[self.candidates] ** 2)
+
+    @cached_property
+    def screened(self) -> tuple[Indices, Coupling]:
+        """The indices of the asperities that cannot touch, as approach plus offset is at most 0 in
+        every solution; and the map from loads to their displacements.
+        """
+        left = np.ones(len(self.scene), dtype=bool)
+        left[self.candidates] = False
+        which = left.nonzero()[0]
+        return which, self.influence.onto(self.scene.contact_points[which])
+
+    def beyond(self, loads: Array, approach: float) -> tuple[Array, Array]:
+        """(m,) indentations D0 + d - A P of the asperities `screened`, with bounds on rounding."""
+        (which, coupling), unit = self.screened, self.units.length
+        n = approach + self.scene.offsets[which] / unit
+        errors = self.scene.offset_errors[which] / unit + 16 * ROUNDOFF * (
+            np.abs(n) + abs(approach)
+        )
+        if len(which) and loads.any():
+            product = coupling.apply(loads)
+            errors += coupling.rounding(loads).of(product) + 16 * ROUNDOFF * np.abs(product)
+            n -= product
+        return n, errors
 
     @cached_property
     def places(self) -> Indices:
