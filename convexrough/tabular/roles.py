@@ -42,10 +42,20 @@ COLUMNS = {
 INDEX = ("index", "id", "no", "nr", "#", "i", "number", "node", "label", "node label", "asperity",
          "row", "")  # fmt: skip
 
+#: First words, in lower case, of rows that summarise a table and are not part of it.
+TOTALS = ("sum", "total", "totals", "grand total", "summe", "gesamt", "somme", "suma",
+          "mean", "average", "max", "min", "maximum", "minimum")  # fmt: skip
+
 
 def is_index(header: str) -> bool:
     """True for the header of a column with row numbers."""
     return bare(header).lower().removesuffix(".") in INDEX
+
+
+def totals(cells: Sequence[str]) -> str:
+    """The first word of a row that summarises a table; "" for other rows."""
+    name = next(filter(None, cells), "")
+    return name if name.rstrip(" :=").lower() in TOTALS else ""
 
 
 #: Largest number of characters of a line that are shown; similarity above which the name of an

@@ -21,10 +21,6 @@ from convexrough.tabular.roles import AS_IT_IS, COLUMNS, Reading, is_index, shor
 from convexrough.tabular.text import HOLES, PERHAPS_GROUPED, Style, TextTable, read_text_table
 from convexrough.tabular.units import bare, unit
 
-#: First words, in lower case, of rows that summarise a table and are not part of it.
-TOTALS = ("sum", "total", "totals", "grand total", "summe", "gesamt", "somme", "suma",
-          "mean", "average", "max", "min", "maximum", "minimum")  # fmt: skip
-
 #: Number of mistakes of one file that are shown; number of cells such as 1.013 with which one whole
 #: number below 100 in their column is enough to show that the mark separates thousands; and number
 #: of columns above which a file without names of columns may be a map.
@@ -251,7 +247,7 @@ def _misfit(cells: Sequence[str], width: int, header: list[str] | None) -> str:
     if len(cells) != width:
         expected = f"{width}, as in {'the header' if header else 'most rows'}"
         return f"found {len(cells)} cells, expected {expected}"
-    if (name := next(filter(None, cells), "")).rstrip(" :=").lower() in TOTALS:
+    if name := roles.totals(cells):
         return f'found a row of "{name}", expected none: remove it'
     return ""
 

@@ -24,7 +24,7 @@ import numpy as np
 from convexrough.arrays import Array
 from convexrough.errors import FileError, InputError, needed
 from convexrough.tabular.arrays import foreign
-from convexrough.tabular.roles import is_index, shortened
+from convexrough.tabular.roles import is_index, shortened, totals
 from convexrough.tabular.units import bare, parsed, unit
 
 #: Largest number of characters of a line, and of a number.
@@ -38,10 +38,11 @@ WORKBOOKS = (".xlsx", ".xlsm")
 SAMPLE, LATER = 200, 20
 
 #: Cells that mean an unknown number, in lower case.
-HOLES = ("", "bad", "nan", "na", "n/a", "#n/a", "none", "null", "---", "***")
+HOLES = ("", "bad", "nan", "na", "n/a", "#n/a", "#nv", "none", "null", "---", "***")
 
-#: The sign # that starts a comment, but not the # in #N/A.
-_SIGN = r"#(?![A-Z]+[/!?])"
+#: The sign # that starts a comment, but not the # in #N/A and other errors of spreadsheets in any
+#: language, such as #NV and #¡VALOR!; nor ####, for a narrow column, if another cell follows.
+_SIGN = r"#(?!(?-i:[¡¿]?[^\W\d_a-zß-ÿ]+[/!?]|NV(?![^\s,;]))|#+ *[,;\t]|##[# ]{0,99}\s[-+.,\d])"
 
 #: The beginning of a line that is a comment, and of a comment that follows cells on a line.
 COMMENT, _BEHIND = re.compile(f"{_SIGN}|%"), re.compile(rf"(?<![^\s,;]){_SIGN}")
@@ -303,8 +304,13 @@ def _unlisted(header: TextRow, rows: list[TextRow], first: int, style: Style) ->
     without titles, repeated headers and closing lines."""
     width = len(rows[first].cells)
 
+    def numbers(row: TextRow) -> list[bool]:
+        return [style.number(cell) is not None for cell in row.cells]
+
     def title(row: TextRow) -> bool:
-        return len(row.cells) != width and (not row.cells or style.number(row.cells[0]) is None)
+        are = numbers(row)
+        most = all(are[-2:]) or 2 * sum(are) > len(are)  # are numbers, so it is a row with a slip
+        return len(are) not in (0, width) and not (are[0] or most)
 
     kept = [row for row in rows[:first] if not title(row)]
     for row in rows[first:]:
@@ -313,9 +319,9 @@ def _unlisted(header: TextRow, rows: list[TextRow], first: int, style: Style) ->
         else:
             while kept and title(kept[-1]):
                 kept.pop()
-    while kept and kept[-1].cells and re.fullmatch(r"[A-Za-z*]+[:=]?", kept[-1].cells[0]):
-        kept.pop()
-    return kept
+    last = max((i for i, row in enumerate(kept) if any(numbers(row)[:1])), default=len(kept))
+    closing = (i for i, row in enumerate(kept) if i > last and (title(row) or totals(row.cells)))
+    return kept[: next(closing, None)]
 
 
 def _lines(path: Path) -> Iterator[tuple[int, str]]:

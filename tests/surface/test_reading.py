@@ -176,7 +176,7 @@ def test_few_decimals_are_no_thousands(tmp_path: Path) -> None:
 
 
 def test_holes_of_whole_rows_and_columns_remain(tmp_path: Path) -> None:
-    for mark in ("#N/A", "---", "***", "nan", ""):
+    for mark in ("#N/A", "#NV", "---", "***", "nan", ""):
         for separator in (",", ";", "\t", " ")[: 4 if mark else 3]:
             for place in (np.s_[3], np.s_[:, 3], np.s_[:, -1], np.s_[0]):
                 if mark or place == np.s_[3]:  # else separators at the end, or empty lines
