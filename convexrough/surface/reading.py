@@ -55,6 +55,8 @@ _ESRI = re.compile(
 )
 _COMMENT = re.compile(f"{COMMENT.pattern}|{_SAID.pattern}|{_ESRI.pattern}", re.I)
 _LENGTH = re.compile(r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(.*)")
+#: The same without a comma that may separate thousands.
+_SIZE = re.compile(rf"(?![1-9]\d*,\d{{3}}(?!\d)){_LENGTH.pattern}")
 
 #: Words that announce a scale, with a number; and words that announce one also without a number.
 _SCALE = re.compile(
@@ -233,8 +235,11 @@ def _matrix(path: Path, table: TextTable, width: int) -> HeightGrid:
             if (np.abs(off) < 0.01 * spread).all():
                 found = f"the means of the {'columns' if place == 'row' else 'rows'}"
                 raise InputError(f"last {place}", found=found, expected="heights alone")
-    stated = filter(None, map(_SAID.fullmatch, table.comments))
-    said = {match[1].lower().rstrip("s"): match[2] for match in stated}
+    matches = filter(None, map(_SAID.fullmatch, table.comments))
+    stated = [*dict.fromkeys((match[1].lower().rstrip("s"), match[2]) for match in matches)]
+    if len(stated) > len(said := dict(stated)):
+        found = ", ".join(map(" ".join, stated))
+        raise InputError("comments", found=found, expected="the size and the unit of one map")
     if pairs := [line.groups() for line in map(_ESRI.match, table.comments) if line]:
         esri = {name.lower(): float(value.replace(",", ".")) for name, value in pairs}
         shape, once = (esri.get("nrows"), esri.get("ncols")), len(esri) == len(pairs)
@@ -246,8 +251,12 @@ def _matrix(path: Path, table: TextTable, width: int) -> HeightGrid:
             raise InputError("header", found=found, expected=expected)
         holed = np.where(heights == esri.get("nodata_value"), np.nan, heights)
         return HeightGrid(holed[::-1], (pixel[0], pixel[1]))  # from the top down
-    sizes = [_LENGTH.fullmatch(said.get(name, "")) for name in ("width", "height")]
+    sizes = [_SIZE.fullmatch(said.get(name, "")) for name in ("width", "height")]
     value_unit = said.get("value unit", "")
+    for name, size in zip(("width", "height"), sizes, strict=True):
+        if name in said and size is None:
+            expected = "a length such as 50 µm, without separators of thousands"
+            raise InputError("comments", found=f"{name} {said[name]}", expected=expected)
     if sizes == [None, None]:
         return HeightGrid(heights, height_unit=value_unit)
     if None in sizes:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from itertools import chain
 from pathlib import Path
 from shlex import quote
 from typing import Any, NamedTuple
@@ -176,7 +177,7 @@ def read_table(
 
 def matrix(path: Path, table: TextTable) -> Array:
     """The numbers of a table without a header; `HOLES` are nan. Raises TableError."""
-    source, mistakes = _text_source(table), list[str]()
+    source, mistakes = _text_source(table, is_matrix=True), list[str]()
     columns = [
         _numbers(str(i), cells, source, mistakes, True) for i, cells in enumerate(source.columns, 1)
     ]
@@ -216,7 +217,7 @@ def _source(path: Path, known: Sequence[str], sheet: Sequence[str]) -> _Source:
     return _Source(header, list(arrays.values()), rows, [""] * count, Style("", ""), said=said)
 
 
-def _text_source(table: TextTable) -> _Source:
+def _text_source(table: TextTable, *, is_matrix: bool = False) -> _Source:
     header, style = table.header.cells if table.header else None, table.style
     counts = [len(row.cells) for row in table.rows]
     width = len(header) if header else Counter(counts).most_common(1)[0][0]
@@ -226,20 +227,30 @@ def _text_source(table: TextTable) -> _Source:
             mistakes.append(_shown(f"row {row.number}: {what}", row.text))
         else:
             whole.append(row)
+    columns: list[Sequence[Any]] = [[row.cells[i] for row in whole] for i in range(width)]
     text = "\n".join(row.text for row in table.rows) if style.separator == "," else "."
     doubled = counts and width <= min(counts) and max(counts) == 2 * width
-    if "." not in text and (doubled or (header is None and re.search(r",0\d", text))):
+    halved = re.search(r",0\d", text) or (is_matrix and _are_halves(columns))
+    if "." not in text and (doubled or (header is None and halved)):
         found = f"rows: found up to {max(counts)} parts between commas, expected numbers"
         mistakes = [f"{found}: write decimal points, or semicolons between columns"]
     return _Source(
         header,
-        [[row.cells[i] for row in whole] for i in range(width)],
+        columns,
         [f"row {row.number}" for row in whole],
         [row.text for row in whole],
         style if width > 1 or style.decimal == "," else style._replace(separator=""),
         mistakes,
         [("comments", text) for text in table.comments],
     )
+
+
+def _are_halves(columns: list[Sequence[str]]) -> bool:
+    """True if each second column, unlike the others, seems to hold the decimals of the one before:
+    digits, always as many."""
+    whole, parts = ({*chain(*columns[i::2])} for i in (0, 1))
+    many = {len(part) if part.isdecimal() else 0 for part in parts}
+    return len(columns) % 2 == 0 and len(many) == 1 and many not in ({0}, {*map(len, whole)})
 
 
 def _misfit(cells: Sequence[str], width: int, header: list[str] | None) -> str:

@@ -217,6 +217,8 @@ WRONG: list[tuple[str, dict[str, Any], str]] = [
     (f"# Width: 9 m\n# Height: 7 m\n{ESRI}", {}, "header: found width, height, ncols"),
     (ESRI, {"pixel": 2.0}, "pixel: found 2 by 2, expected 2.5 by 2.5, as the file states"),
     ("-0,359,-0,042,0,100\n" * 3, ONE, "rows: found up to 6 parts between commas, expected num"),
+    *((f"1,9{apart}-0,7{apart}12,3\n-0,4{apart}2,0{apart}-3,1\n8,8{apart}0,1{apart}1,2\n", ONE,
+       "rows: found up to 6 parts between commas, expected num") for apart in (",", ", ")),
     ("% x y z in mm\n0 0 1\n1 0 2\n0 1 1\n1 1 1\n", {},
      r'"x \[µm\] y \[µm\] z \[nm\]" above columns'),
     ("@", {}, "pixel: found none, expected its size, which the file does not state"),
@@ -234,6 +236,9 @@ WRONG: list[tuple[str, dict[str, Any], str]] = [
     ("@", ONE | {"height_unit": "nm"}, "unit: found none, expected the unit of"),
     ("# Width: 9 µm\n# Height: 7 µm\n@", {"unit": "nm"}, "unit: found nm, expected "),
     ("# Width: 9 µm\n# Height: 7 nm\n@", {}, "units: found µm and nm, expected one"),
+    *((f"# Width: 9 µm\n# Height: {each}\n@", ONE, f"comments: found height {each}, expected a len")
+      for each in ("1,000 µm", "twice")),
+    ("# Width: 9 m\n# Height: 7 m\n# Width: 9 mm\n@", {}, "found width 9 m, height 7 m, width 9 m"),
     ("# Height: 7 µm\n@", ONE | {"unit": "mm"}, "comments: found only a hei"),
     ("# Width: 9 m\n# Height: 7 m\n@", {"pixel": 2.0}, "found 2 by 2, expected 1 by"),
     ("@" + matrix([HEIGHTS.mean(axis=0).round(3)]), ONE, "last row: found the means of"),
