@@ -38,7 +38,7 @@ class ReadTable(NamedTuple):
     lines: list[str]  # the text of each row, "" in files of arrays
     units: dict[str, str]  # those that headers name
     style: str  # how text was split, "" for files of arrays
-    called: dict[str, str]  # the headers
+    called: dict[str, str]  # the headers; also that of the index, if `Reading.columns` names it
     #: Columns that were not asked for, by header or number from 1, as numbers if all cells are. The
     #: one that `Reading.columns` names as index has the key "index".
     others: dict[str, NDArray[Any]]
@@ -169,7 +169,7 @@ def read_table(
     refuse(path, [*mistakes, *source.mistakes])
     unread = {names[i]: source.numbers_or_text(i) for i in rest}
     if index is not None:
-        unread["index"] = source.numbers_or_text(index)
+        places["index"], unread["index"] = index, source.numbers_or_text(index)
     titles = {name: names[place] or str(place + 1) for name, place in places.items()}
     style = str(source.style)
     return ReadTable(read, source.rows, source.lines, units, style, titles, unread, factors)

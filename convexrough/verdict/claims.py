@@ -305,7 +305,7 @@ def _explained(table: ReadTable) -> Iterator[str]:
         unit = f" in {table.units[name]}" if name in table.units else ""
         times = f", times {table.factors[name]:.15g}" if name in table.factors else ""
         yield f"{name}: column {bare(called)}{unit}{times}"
-    if left := [*filter(None, table.others)]:
+    if left := [name for name in table.others if name and name not in table.called]:
         yield f"not looked at: {', '.join(left)}"
 
 

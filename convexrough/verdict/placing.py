@@ -178,8 +178,9 @@ class Placing:
             x, y = places["x"], places["y"]
             expected = f"expected --column x={x} --column y={y}"
             self.mistakes.append(f"columns {x}, {y}: found no x and y, {expected}")
-        for name, index in self._indices().items():
+        for name, index in (indices := self._indices()).items():
             if (numbered := self._numbered(name, index)) is not None:
+                self.mistakes += self._doubts(name, numbered, indices)
                 return numbered, True
         rows = len(self.table.rows)
         if nameless := [name for name in self.table.others if name.isdecimal()]:
@@ -189,10 +190,13 @@ class Placing:
         return np.arange(rows), False
 
     def _indices(self) -> dict[str, Indices]:
-        """Unread columns that may be indices, by header; first those whose header says so."""
+        """Unread columns that may be indices, by header; first those whose header says so, of which
+        a row number comes last."""
         count = np.arange(len(self.scene))
         named, others = dict[str, Indices](), dict[str, Indices]()
-        for name, cells in self.table.others.items():
+        held = self.table.others
+        held = {"index": held["index"]} if "index" in self.table.called else held
+        for name, cells in held.items():
             whole = np.char.isdecimal(cells.astype(str))
             if cells.dtype.kind == "f":
                 whole = (np.floor(cells) == cells) & (cells >= 0) & (cells < 2**53)
@@ -209,7 +213,25 @@ class Placing:
                 named[name] = index
             elif falls and least <= 1 and np.array_equal(np.sort(index), count + least):
                 others[name] = index
-        return named | others
+
+        def doubt(name: str) -> tuple[bool, bool]:
+            return bare(name).lower() not in SURELY_INDEX, bool((np.diff(named[name]) == 1).all())
+
+        return {name: named[name] for name in sorted(named, key=doubt)} | others
+
+    def _doubts(
+        self, name: str, numbered: Indices, indices: Mapping[str, Indices]
+    ) -> Iterator[str]:
+        """A message if the header of the index `name` does not say so, or another one differs."""
+        if not is_index(name):
+            expected = f"the scene's order and no such column, or --column index={quote(name)}"
+            yield f"column {name}: found each index once, expected {expected}"
+        for other, index in indices.items():
+            index = index - min(int(index.min()), 1)
+            differs = (np.diff(index) < 0).any() and (index != numbered).any()
+            if is_index(other) and differs and np.array_equal(np.sort(index), np.sort(numbered)):
+                found = f"found asperities {numbered[0]}, ... and {index[0]}, ..."
+                yield f"columns {name}, {other}: {found}, expected one index: --column index=NAME"
 
     def _numbered(self, name: str, index: Indices) -> Indices | None:
         """(m,) indices from 0, from a column that counts from 0 or 1; None for other columns."""

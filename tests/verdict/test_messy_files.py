@@ -173,6 +173,12 @@ READ: dict[str, tuple[Any, ...]] = {
     "an index of another name": (
         lambda case: shuffled(case, 0, "place") | {"index": np.arange(COUNT)}, "a.csv",
         "--column index=place"),
+    **{f"a row number {before!r} before the index": (
+        lambda case, before=before, name=name:
+        {before: np.arange(COUNT) + 1} | shuffled(case, 1, name),)
+       for before, name in (("", "asperity"), ("no", "asperity"), ("row", "index"),
+                            ("index", "asperity"))
+    },
     "compression is negative": (
         lambda case: case.table(load=-case.loads[case.order]), "a.csv", "--sign -1"),
     "another name": (lambda case: case.table("x y P"), "a.csv", "--column load=P"),
@@ -300,6 +306,11 @@ REFUSED: dict[str, tuple[Any, ...]] = {
                              "12 columns and 3 rows: transposed?"),
     "a page of HTML": (lambda _: "<!DOCTYPE html>\n<html><body>404</body></html>\n", "",
                        "a page in HTML"),
+    "ranks": (lambda case: {"load": case.loads, "rank": case.order + 1}, "",
+              "column rank: found each index once, expected the scene's order and no such column, ",
+              "--column index=rank"),
+    "two indices": (lambda case: shuffled(case, 1) | {"asperity": np.arange(COUNT)[::-1]}, "",
+                    "columns index, asperity: found asperities ", "expected one index: --column i"),
     "an index from who knows where": (lambda _: {"index": [3, 4, 5], "load": [1, 2, 3]}, "",
                                       "found numbers from 3 to 5, expected also 0, if they count",
                                       "or 12, if they count from 1: add this row with load 0"),
