@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from convexrough.arrays import Array, Indices
 from convexrough.errors import FileError, InputError
 from convexrough.surface.surface import checked_pixel
-from convexrough.tabular.arrays import named_arrays
+from convexrough.tabular.arrays import named_arrays, parts
 from convexrough.tabular.units import bare, one_unit, unit
 
 #: Names of arrays of an .npz or .mat file: of the heights; of the pixel and the units; and parts of
@@ -53,7 +53,7 @@ def arrays_map(path: Path) -> HeightGrid:
         """True for what may change the meaning of heights: a factor, a mask, coordinates."""
         alike = values.size in (1, named[chosen].size, *named[chosen].shape)
         numbers = values.dtype.kind in "biufc" and (alike or values.ndim > 1) and values.size > 0
-        return bool(SCALES.search(name)) or numbers
+        return bool(SCALES.search(name)) or numbers or values.dtype.kind == "O"
 
     rest = {it: found[it] for it in found if it != chosen and it.lower() not in (*STATED, "x", "y")}
     others = [name for name, values in rest.items() if may_change(name, values)]
@@ -62,11 +62,11 @@ def arrays_map(path: Path) -> HeightGrid:
         expected += "marks holes"
         raise InputError("arrays", found=", ".join(others), expected=expected)
     size = checked_pixel(np.squeeze(named["pixel"])) if "pixel" in named else None
-    said, height_unit = (str(named.get(name, "")) for name in STATED[1:])
+    said, height_unit = (" ".join(map(str, parts(named.get(name, ())))) for name in STATED[1:])
     if upwards := one_unit("height_unit", height_unit, unit(chosen)):
         height_unit = upwards.name
     texts = [(name, values) for name, values in rest.items() if values.dtype.kind in "US"]
-    comments = tuple(f"{name}: {each}" for name, values in texts for each in values.ravel())
+    comments = tuple(f"{name}: {each}" for name, values in texts for each in parts(values))
     heights = np.squeeze(_numbers(named[chosen]))
     axes = [np.atleast_1d(np.squeeze(_numbers(named[name]))) for name in "xy" if name in named]
     if len(axes) == 1:

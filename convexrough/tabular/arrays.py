@@ -97,22 +97,20 @@ def read_arrays(path: Path, known: Sequence[str]) -> tuple[Columns, list[tuple[s
     kept = {name: values for name, values in columns.items() if len(values) in lengths}
     said = list[tuple[str, str]]()
     for name, value in named.items() if len(named) > 1 else ():
-        neutral = 0 if "offset" in name.lower() else 1
-        if FACTORS.search(name) and any(part != neutral for part in _parts(value)):
+        neutral, held = 0 if "offset" in name.lower() else 1, parts(value)
+        if FACTORS.search(name) and any(part != neutral for part in held):
             raise FileError(f"{path}: found {name}, expected columns that need no factor or offset")
-        if "unit" in name.lower() and name not in kept:
-            said.append((f"array {name}", f"{name}: {', '.join(map(str, _parts(value)))}"))
+        if name not in kept and any(isinstance(part, str) for part in held):
+            said.append((f"array {name}", f"{name}: {', '.join(map(str, held))}"))
     return kept, said
 
 
-def _parts(value: Any) -> list[Any]:
-    """The numbers and texts in an array, or in a structure or cell array of MATLAB."""
-    if isinstance(value, dict):
-        value = [*value.values()]
+def parts(value: Any) -> list[Any]:
+    """The numbers and texts in an array."""
     if isinstance(value, np.ndarray):
         value = value.tolist()
     if isinstance(value, (list, tuple)):
-        return [each for part in value for each in _parts(part)]
+        return [each for part in value for each in parts(part)]
     return [value.decode("utf-8", "replace") if isinstance(value, bytes) else value]
 
 
@@ -152,7 +150,8 @@ def _table(values: NDArray[Any]) -> Columns:
 
 
 def _matlab(path: Path) -> dict[str, Any]:
-    """The variables of a file or, if its only variable is a structure, the structure's fields."""
+    """The variables of a file or, if its only variable is a structure, its fields; those of other
+    structures by names such as info.unit, and cell arrays of texts and numbers as text."""
     from scipy.io import loadmat  # takes 0.1 s to import
 
     with path.open("rb") as raw:
@@ -168,7 +167,24 @@ def _matlab(path: Path) -> dict[str, Any]:
                 said = f"{count} values in {name} of structure {k}, expected one in each"
                 raise FileError(f"{path}: found {said}")
         return {name: np.array([each[name] for each in only]) for name in only[0]}
-    return only if isinstance(only, dict) else named
+    return dict(_flat("", only if isinstance(only, dict) else named))
+
+
+def _flat(name: str, value: Any) -> Iterator[tuple[str, Any]]:
+    if isinstance(value, np.ndarray) and value.dtype.kind == "O":
+        cells = value.ravel().tolist()
+        if any(isinstance(each, str) for each in cells) and not any(map(np.ndim, cells)):
+            texts = all(isinstance(each, str) for each in cells)
+            value = np.array(cells if texts else " ".join(map(str, cells)))
+        else:
+            value = cells
+    if isinstance(value, list):
+        value = dict(enumerate(value, 1))
+    if isinstance(value, dict):
+        for key, each in value.items():
+            yield from _flat(f"{name}.{key}" if name else key, each)
+    else:
+        yield name, value
 
 
 def _parquet(path: Path) -> dict[str, Any]:

@@ -76,6 +76,14 @@ def test_arrays(tmp_path: Path) -> None:
     ):  # fmt: skip
         with pytest.raises(cr.InputError, match=said):
             raw(several, arrays)
+    for beside, said in (
+        ({"scale": 0.5, "of": {"unit": "nm"}}, "arrays: found info.scale, info.of.unit, expected"),
+        (np.array(["scale", 0.5], dtype=object), "comments: found info: scale 0.5, expected"),
+    ):
+        with pytest.raises(cr.InputError, match=said):
+            raw(tmp_path / "b.mat", {"heights": HEIGHTS, "info": beside}, pixel=1.0)
+    for named in (np.array(["µm"]), "µm".encode()):
+        assert raw(several, sides | {"unit": named}).unit == "µm"
 
 
 def test_what_gwyddion_writes(tmp_path: Path) -> None:

@@ -222,6 +222,13 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "a factor as an array": (
         lambda case: case.table() | {"scale": np.array(1e-3)}, "a.npz",
         "found scale, expected columns that need no factor or offset"),
+    **{f"MATLAB's {each} beside": (
+        lambda case, beside=beside: case.table() | {"info": beside}, "a.mat", said)
+       for each, beside, said in (
+           ("factor", {"factor": 1e-3}, "found info.factor, expected columns that need no"),
+           ("unit", {"unit": "kN"}, "array info.unit: found 'info.unit: kN', expected units in"),
+           ("cells", np.array(["loads times", 1e-3], dtype=object), "array info: found 'info: l"))
+    },
     "a unit in a column": (
         lambda case: "".join(f"{line},{'unit' if k == 0 else 'kN'}\n"
                              for k, line in enumerate(lines(case.table()).splitlines())), "",
