@@ -26,7 +26,7 @@ from convexrough.surface.map_arrays import HeightGrid
 from convexrough.surface.pixels import filled
 from convexrough.surface.surface import Surface, checked_pixel
 from convexrough.tabular.arrays import reading
-from convexrough.tabular.roles import COLUMNS, Reading, is_index
+from convexrough.tabular.roles import CHANGED, COLUMNS, Reading, is_index, states_factor
 from convexrough.tabular.table import matrix, read_table
 from convexrough.tabular.text import COMMENT, WORKBOOKS, TextTable, read_text_table
 from convexrough.tabular.units import in_text, one_unit, parsed
@@ -58,15 +58,10 @@ _LENGTH = re.compile(r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(.*)")
 #: The same without a comma that may separate thousands.
 _SIZE = re.compile(rf"(?![1-9]\d*,\d{{3}}(?!\d)){_LENGTH.pattern}")
 
-#: Words that announce a scale, with a number; and words that announce one also without a number.
+#: Words that announce a scale, with a number.
 _SCALE = re.compile(
     r"pixel|scale|fa[ck]tor|mult|gain|cal(?:ib|\b)|\bz ?cal|lsb|resolution|spacing|step"
     r"|\bd[xyz]\b|[*×]\s*\d|\bx\s*\d+\s*$",
-    re.I,
-)
-_CHANGED = re.compile(
-    r"\b(counts|digits|volts?|mV|waves|fringes|inch(?:es)?|mils?|thou|feet|ft|inverted|depths?|down"
-    r"|downwards|multiplied|divided|(?:nano|mi[ck]ro|milli)met\w+)\b",
     re.I,
 )
 
@@ -206,9 +201,10 @@ def states_scale(comment: str) -> bool:
     unit = parsed(length[2] if length else value.strip())
     if marked and unit and unit.kind == "length":
         return True
-    named = map(parsed, in_text(comment))
-    scaled = _CHANGED.search(comment) or (re.search(r"\d", comment) and _SCALE.search(comment))
-    return bool(scaled) or any(not unit or unit.kind == "length" for unit in named)
+    scaled = re.search(r"\d", comment) and _SCALE.search(comment)
+    if scaled or CHANGED.search(comment) or states_factor(comment):
+        return True
+    return any(not unit or unit.kind == "length" for unit in map(parsed, in_text(comment)))
 
 
 def _matrix(path: Path, table: TextTable, width: int) -> HeightGrid:

@@ -58,6 +58,12 @@ def totals(cells: Sequence[str]) -> str:
     return name if name.rstrip(" :=").lower() in TOTALS else ""
 
 
+#: Words for heights that are no lengths, or that grow downwards.
+CHANGED = re.compile(
+    r"\b(counts|digits|volts?|mV|waves|fringes|inverted|depths?|down|downwards|multiplied|divided)\b",
+    re.I,
+)
+
 #: Largest number of characters of a line that are shown; similarity above which the name of an
 #: unread column may be a misspelling; and relative difference up to which factors are equal.
 MOST_SHOWN, LOOKS_LIKE, SAME = 60, 0.75, 1e-9
@@ -198,10 +204,7 @@ def units_in(said: Iterable[tuple[str, str]], names: Sequence[str], how: Reading
     unit than the scene's for one of the columns `names`, whose headers state none."""
     kinds = {COLUMNS[name].kind for name in names}
     for place, text in said:
-        numbers = re.findall(r"[+-]?[.,]?\d[\d.,]*(?:e[+-]?\d+)?", text, re.I)
-        changes = not all(re.fullmatch(r"\+?(1(\.0*)?|0)", number) for number in numbers)
-        factor = FACTORS.search(text) or TIMES.search(text)
-        if changes and factor and not how.scales:
+        if states_factor(text) and not how.scales:
             way = ", or --scale" * how.scalable
             yield f"{place}: found {shortened(text)!r}, expected no factor of the numbers{way}"
         for name in in_text(text):
@@ -212,6 +215,14 @@ def units_in(said: Iterable[tuple[str, str]], names: Sequence[str], how: Reading
                 expected = f"units in the header, as NAME [{name}], or no such {place.split()[0]}"
                 yield f"{place}: found {shortened(text)!r}, expected {expected}"
                 break
+
+
+def states_factor(text: str) -> bool:
+    """True for a text that states a factor other than 1, or an offset other than 0."""
+    numbers = r"[+-]?[.,]?\d[\d.,]*(?:e[+-]?\d+)?|\b(?:two|ten|hundred|thousand|million)\b"
+    found = re.findall(numbers, text, re.I)
+    changes = not all(re.fullmatch(r"\+?(1(\.0*)?|0)", number) for number in found)
+    return changes and bool(FACTORS.search(text) or TIMES.search(text))
 
 
 def shortened(text: str) -> str:

@@ -157,6 +157,10 @@ def read_table(
         texts += [(f"column {names[i]}", each) for each in said]
     without = [name for name in places if name not in (*units, *how.scales)]
     mistakes += [*wrong, *roles.units_in(texts, without, how)]
+    for where, text in texts:
+        if "height" in places and roles.CHANGED.search(text):
+            expected = f"heights that grow towards the sphere, or no such {where.split()[0]}"
+            mistakes.append(f"{where}: found {shortened(text)!r}, expected {expected}")
     read: dict[str, NDArray[Any]] = {}
     for name, place in places.items():
         cells = source.columns[place]

@@ -48,24 +48,30 @@ UNITS = {
 } | {
     name: Unit(Fraction(size), *powers, name)
     for name, size, powers in (
-        *(("Å", "1e-10", (1, 0)), ("in", "0.0254", (1, 0)), ("dyn", "1e-5", (0, 1))),
+        *(("Å", "1e-10", (1, 0)), ("in", "0.0254", (1, 0)), ("mil", "2.54e-5", (1, 0))),
+        ("dyn", "1e-5", (0, 1)),
         *(("kgf", "9.80665", (0, 1)), ("lbf", "4.4482216152605", (0, 1))),
         *(("bar", "1e5", (-2, 1)), ("psi", PSI, (-2, 1))),
     )
 }
 
-#: Other names of units. In addition, a leading u is read as µ.
-_ALSO = {"A": "Å", "Angstrom": "Å", "micron": "µm", "microns": "µm", "kp": "kgf"}
+#: Other names of units, words in lower case. In addition, a leading u is read as µ.
+_ALSO = {"A": "Å", "angstrom": "Å", "micron": "µm", "microns": "µm", "kp": "kgf", "inch": "in",
+         "inches": "in", "mils": "mil", "thou": "mil"}  # fmt: skip
+_LONG = {"pico": "p", "nano": "n", "micro": "µ", "mikro": "µ", "milli": "m", "centi": "c",
+         "zenti": "c", "": ""}  # fmt: skip
+_ALSO |= {f"{long}met{end}": f"{short}m" for long, short in _LONG.items()
+          for end in ("er", "re", "ers", "res", "ern")}  # fmt: skip
 _FACTOR = re.compile(r"(.*?)(?:\^|\*\*)?([+-]?\d)?")
 _POWERS = str.maketrans("⁻¹²³μ−", "-123µ-")
 
-#: A unit of length or force in a sentence. "um", "m" and "N" count only after a digit, a mark, "in"
-#: or a word such as "unit", because they can also be words or symbols.
+#: A unit of length or force in a sentence. "um", "m", "metre" and "N" count only after a digit, a
+#: mark, "in" or a word such as "unit", because they can also be words or symbols.
 _IN_TEXT = re.compile(
-    r"(?<![^\W\d])((?i:nm|µm|μm|mm|Å|angstroms?|microns?|(?:nano|micro|milli)met(?:er|re)s?)"
-    r"|cm|[nµμmkM]N|kgf|lbf)(?!\w)"
+    r"(?<![^\W\d])((?i:nm|µm|μm|mm|Å|[aå]ngstr[oö]ms?|microns?|inch(?:es)?|mils?|thou|feet|ft"
+    r"|(?:pico|nano|mi[ck]ro|milli|[cz]enti)met(?:er|re)[sn]?)|cm|[nµμmkM]N|kgf|lbf)(?!\w)"
     r"|(?:[\d(\[,:=]\s*|\b[Ii]n\s+|\b(?i:units?|einheit(?:en)?|length)\b[\s;:=]*)"
-    r"((?i:um)|[mN])(?![\w/]|\s*=)"
+    r"((?i:um|met(?:er|re)[sn]?)|[mN])(?![\w/]|\s*=)"
     r"|(纳米|微米|毫米)"
 )
 
@@ -81,9 +87,10 @@ AMBIGUOUS = ("in", "bar", "pm")
 
 
 def in_text(text: str) -> list[str]:
-    """The units of length and force in a sentence, or all units in a row of units."""
+    """The units of length and force in a sentence, or all units in a text of units alone."""
     cells = re.split(r"\s*[;,\t]\s*", text.strip(" #%"))
-    if len(cells) > 1 and all(each and parsed(each) for each in cells):
+    alone = len(cells) == 1 and not re.fullmatch(r"\S\S+", cells[0])  # a letter, or a sentence
+    if not alone and all(each and parsed(each) for each in cells):
         return cells
     return [next(filter(None, found.groups())) for found in _IN_TEXT.finditer(text)]
 
@@ -97,7 +104,8 @@ def parsed(name: str) -> Unit | None:
     for part, sign in [(upper, 1), *((each, -1) for each in under)]:
         for factor in re.split(r"\s+|·|\*(?!\*)", part.replace("**", "^").strip()):
             symbol, power = _FACTOR.fullmatch(factor).groups()  # type: ignore[union-attr]
-            symbol = re.sub("^u", "µ", _ALSO.get(symbol, symbol))  # no symbol begins with u
+            symbol = _ALSO.get(symbol) or _ALSO.get(symbol.lower(), symbol)
+            symbol = re.sub("^u", "µ", symbol)  # no symbol begins with u
             if symbol not in UNITS:
                 return None
             found *= UNITS[symbol] ** (sign * int(power or 1))

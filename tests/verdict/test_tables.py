@@ -261,7 +261,9 @@ def test_summits(tmp_path: Path) -> None:
     assert asperities.heights.tolist() == [1e-3, -1e-3]
 
 
-@pytest.mark.parametrize("name", ["tip radius", "Tip-Radius", "TIP  RADIUS (m)", "tip\nradius"])
+@pytest.mark.parametrize(
+    "name", ["tip radius", "Tip-Radius", "TIP  RADIUS (m)", "tip\nradius", "radius [Metres]"]
+)
 def test_the_spelling_of_a_heading(tmp_path: Path, name: str) -> None:
     path = tmp_path / put(tmp_path, [[["x", "y", name], [0, 1, 2]]], "a.xlsx")
     how = Reading(units=UnitNames("m"))
@@ -314,6 +316,12 @@ WRONG_SUMMITS = [
     ("# heights x 1000\nx,y,z\n0,0,1\n", "found '# heights x 1000', expected no factor of the"),
     *((f"{each}\n,,height,tip_radius\n0,0,1,2\n", "rows 1 and 2: found a heading o")
       for each in ("x,y,Summit,", "X-Koordinate,Y-Koordinate,Summit,")),
+    ("# values times ten\nx,y,z\n0,0,1\n", "found '# values times ten', expected no factor of the"),
+    *((f"# {each}\nx,y,z\n0,0,1\n", f"comments: found '# {each}', expected heights that grow t")
+      for each in ("depths", "positive downwards", "heights in volts")),
+    *((f"# {each}\nx,y,z\n0,0,1\n", f"found '# {each}', expected units in the header, as NAME [")
+      for each in ("in inches", "um", "Mikrometer", "all lengths in metres", "in mil")),
+    ("x [mil],y [mil],radius [inch]\n0,0,1\n", "column tip_radius: found inch, expected mil, as x"),
     ("# units: micrometres\nx,y,z\n0,0,1\n", "found '# units: micrometres', expected units in"),
 ]  # fmt: skip
 
