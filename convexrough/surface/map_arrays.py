@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
-from convexrough.errors import FileError, InputError
+from convexrough.errors import ConvexroughError, FileError, InputError
 from convexrough.surface.surface import checked_pixel
 from convexrough.tabular.arrays import named_arrays, parts
 from convexrough.tabular.units import bare, one_unit, unit
@@ -24,6 +24,9 @@ STATED = ("pixel", "unit", "height_unit")
 SCALES = re.compile(
     "unit|scale|factor|multipl|gain|offset|lsb|pixel|spacing|step|resol|calib|^d[xyz]$", re.I
 )
+
+#: The first bytes of a map by Zygo's MetroPro, whose name ends in .dat.
+METROPRO = b"\x88\x1b\x03"
 
 #: Largest relative difference of a stated pixel from the steps of x and y, which may be rounded.
 ROUNDED = 1e-3
@@ -99,15 +102,11 @@ def _numbers(values: NDArray[np.generic]) -> Array:
     return np.asarray(values, dtype=np.float64)
 
 
-def instrument_map(path: Path, pixel: float | tuple[float, float] | None) -> HeightGrid:
-    """The heights of the default channel of a file that SurfaceTopography can read.
-
-    pixel : size of a pixel, used if the file does not state the size of the map
-    """
+def instrument_map(path: Path) -> HeightGrid:
+    """The only map of heights in a file that SurfaceTopography can read."""
     try:
         with catch_warnings(action="ignore", category=ImportWarning):  # MPI is optional
             from SurfaceTopography import open_topography
-            from SurfaceTopography.Exceptions import ReadFileError
     except ImportError as error:
         expected = "a map in .npy, .npz, .mat, text (.csv, .txt, .dat, .asc, .tsv, .xyz) or .xlsx; "
         expected += "an instrument's file needs SurfaceTopography: pip install SurfaceTopography"
@@ -115,27 +114,30 @@ def instrument_map(path: Path, pixel: float | tuple[float, float] | None) -> Hei
     path.open("rb").close()  # raises the usual error for a missing file
     try:
         with open_topography(str(path)) as reader:
-            if not reader.channels:
-                expected = "a map of heights; export it as text, for example"
-                raise InputError("file", found="no heights", expected=expected)
-            channel = reader.default_channel
-            given: dict[str, Any] = {}
-            if channel.physical_sizes is None and pixel is not None:
-                counts = zip(channel.nb_grid_pts, checked_pixel(pixel), strict=True)
-                given["physical_sizes"] = tuple(count * size for count, size in counts)
-            topography = reader.topography(**given)
-    except ReadFileError as error:
-        reason = str(error).partition("\n")[0] or type(error).__name__
+            maps = reader.height_channels
+            if len(maps) != 1:
+                found = ", ".join(channel.name for channel in maps) or "no heights"
+                expected = "one map of heights; export it alone, as text for example"
+                raise InputError("file", found=found, expected=expected)
+            sized = maps[0].physical_sizes is not None
+            sizes = {} if sized else {"physical_sizes": maps[0].nb_grid_pts}
+            topography = reader.topography(channel_index=maps[0].index, **sizes)
+            if topography.dim != 2:
+                raise InputError("file", found="a line scan", expected="a map")
+            heights = np.ma.filled(np.ma.asarray(topography.heights(), dtype=np.float64), np.nan)
+    except (OSError, ConvexroughError):
+        raise
+    except Exception as error:  # damaged files cause errors of many kinds
+        reason = str(error).partition("\n")[0]
+        reason = reason if " " in reason else repr(error)
         if reason.startswith("tried"):  # a list with an error for each of its formats
             reason = "it is in none of its formats; export the map as text, for example"
         raise FileError(f"{path}: SurfaceTopography cannot read it: {reason}") from error
-    if topography.dim != 2:
-        raise InputError("file", found="a line scan", expected="a map")
-    heights = np.ma.filled(np.ma.asarray(topography.heights(), dtype=np.float64), np.nan)
-    sizes = topography.physical_sizes
-    size: Any = None if sizes is None else tuple(np.divide(sizes, heights.shape).tolist())
-    unit = str(topography.unit or "")
-    return HeightGrid(heights.T.copy(), size, unit, unit)
+    unit, heights = str(topography.unit or ""), heights.T.copy()
+    if not sized:
+        return HeightGrid(heights, height_unit=unit)
+    dx, dy = np.divide(topography.physical_sizes, heights.shape[::-1]).tolist()
+    return HeightGrid(heights, (dx, dy), unit, unit)
 
 
 def refuse_other(

@@ -107,12 +107,13 @@ def read(
     with blamed_on(path, unless_known=True):
         kind = path.suffix.lower()
         with reading(path):
-            if kind in TEXT:
+            binary = kind == ".dat" and path.read_bytes()[:3] == map_arrays.METROPRO
+            if kind in TEXT and not binary:
                 grid = text_map(path)
             elif kind in (".npy", ".npz", ".mat"):
                 grid = map_arrays.arrays_map(path)
             else:
-                grid = map_arrays.instrument_map(path, pixel)
+                grid = map_arrays.instrument_map(path)
         unclear = next(filter(states_scale, grid.comments), "")
         if unclear and not ((pixel or grid.pixel) and (height_unit or grid.height_unit)):
             expected = '"Width: 50 µm", "Height: 50 µm" and "Value units: nm" above a matrix, '

@@ -340,11 +340,16 @@ def test_other_text_above_the_numbers_is_a_comment(tmp_path: Path) -> None:
     assert_array_equal(turned.heights.T, surface.heights)
 
 
+METROPRO = bytes.fromhex("881b036f000100000342") + bytes(2000)
+
+
 def test_without_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "SurfaceTopography", None)
     said = r"a\.png: found \.png, expected a map in \.npy, .* needs SurfaceTopography: pip"
     with pytest.raises(cr.FileError, match=said):
         raw(tmp_path / "a.png", b"PNG")
+    with pytest.raises(cr.FileError, match=said.replace("png", "dat")):
+        raw(tmp_path / "a.dat", METROPRO)
 
 
 @pytest.mark.skipif(
@@ -383,3 +388,21 @@ class TestInstruments:
             raw(tmp_path / "a.bin", b"\1\2\3" * 50)
         with pytest.raises(cr.FileError, match="cannot be read: No such file"):
             raw(tmp_path / "b.gwy")
+        held = self.written(tmp_path / "a.gwy").read_bytes()[21:]
+        both = held + held.replace(b"/0/", b"/1/")
+        gwy = b"GWYPGwyContainer\0" + len(both).to_bytes(4, "little") + both
+        with pytest.raises(cr.InputError, match=r"file: found .*, .*, expected one map of heights"):
+            raw(tmp_path / "b.gwy", gwy)
+        header = b"fileformat = bcrstm\nheadersize = 99\nxpixels = 2\nypixels = 2\n"
+        with pytest.raises(cr.FileError, match=r"cannot read it: KeyError\('xlength'\)"):
+            raw(tmp_path / "a.bcr", header.ljust(200))
+
+    def test_a_map_without_its_size(self, tmp_path: Path) -> None:
+        """The unit of its heights is not that of the pixel that is given."""
+        with import_module("h5py").File(tmp_path / "a.h5", "w") as file:
+            file["surface"] = HEIGHTS.T
+        with pytest.raises(cr.InputError, match="pixel: found none, expected its size"):
+            raw(tmp_path / "a.h5")
+        assert_array_equal(raw(tmp_path / "a.h5", pixel=1.0).heights, HEIGHTS)
+        with pytest.raises(cr.InputError, match="found none, expected the unit of the pixel, as h"):
+            raw(tmp_path / "a.dat", METROPRO, pixel=1.0)
