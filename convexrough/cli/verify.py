@@ -65,8 +65,9 @@ class _Reporting(click.Command):
         parts = (each.split("=", 1) if each.startswith("--junit=") else [each] for each in args)
         words = [*chain(*parts)]
         earlier = Path(dict(pairwise(words)).get("--junit", ""))
+        times = [Path(each).resolve() for each in words].count(earlier.resolve())  # 2 for an input
         runs = "--force" in words and not {"--help", "-h"} & {*words} and not ctx.resilient_parsing
-        if runs and earlier.suffix.lower() == ".xml":
+        if runs and times == 1 and earlier.suffix.lower() == ".xml":
             with suppress(OSError):  # `verify` reports it
                 earlier.unlink(missing_ok=True)
         return super().parse_args(ctx, args)
@@ -143,6 +144,8 @@ def verify(
         raise FileError(f"--junit {junit}: found {junit.suffix or 'no ending'}, expected .xml")
     alone = [Path("proof.json")] if output.proof and output.out is None else []
     for each in [*alone, *([junit] if junit else [])]:
+        if each.resolve() in (it.resolve() for it in (scene, loads, shear) if it):
+            raise FileError(f"{each}: found an input, expected another file to write")
         if each.exists() and not output.force:
             raise FileError(f"{each}: exists already; --force replaces it")
         with file_errors(each, "be written"):

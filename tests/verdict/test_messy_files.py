@@ -648,6 +648,11 @@ def test_findings_as_junit(case: Case) -> None:
         for force in ("", "--force"):
             assert case.command("verify", "scene.toml", *f"{wrong} {force}".split()).status == 2
             assert Path("b.xml").exists() == (not force)
+    for name, option in (("c.xml", "--junit c.xml"), ("proof.json", "--proof")):  # an input stays
+        kept = lines({"load": case.loads})
+        outcome = case.verify(kept, *option.split(), "--force", name=name)
+        assert outcome.refuses(f"{name}: found an input, expected another file to write")
+        assert Path(name).read_text() == kept
 
 
 def test_bytes_of_every_kind_end_in_a_reason(case: Case) -> None:
