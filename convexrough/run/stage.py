@@ -45,7 +45,7 @@ KINDS = {
     "force": ("load", "force", "largest_load", "load_error", "force_amplitude", "level", "front"),
     "length": ("approach", "displacement", "displacement_amplitude", "approach_error",
                "displacement_error", "prescribed_displacement", "gap_error", "radius", "spacing",
-               "tip_radius", "within", "height_std"),
+               "tip_radius", "within", "height_std", "x", "y", "height", "contact_radius", "gap"),
     "work": ("loss", "loss_error", "loss_first", "loss_first_error", "duality_gap", "smooth",
              "partial_slip_loss", "sliding_loss"),
     "stiffness": ("secant_stiffness",),

@@ -29,6 +29,7 @@ from convexrough.surface.summits import Summits
 from convexrough.surface.surface import Surface
 from convexrough.tabular.columns import aligned, labelled
 from convexrough.tabular.roles import shortened
+from convexrough.tabular.units import in_unit
 from convexrough.version import __version__
 
 #: The units of columns and statistics; {} stands for the unit of length.
@@ -136,8 +137,7 @@ def summit_columns(summits: Summits) -> dict[str, Any]:
 
 
 def _in_unit(name: str, unit: str) -> str:
-    """The name of a column, with its unit if it has one."""
-    return f"{name} [{LENGTHS[name].format(unit)}]" if unit and name in LENGTHS else name
+    return in_unit(name, LENGTHS.get(name, "").format(unit) if unit else "")
 
 
 def describe_surface(scanned: Scanned) -> list[str]:

@@ -123,6 +123,11 @@ def unit(name: str) -> str:
     return _apart(name)[1]
 
 
+def in_unit(name: str, unit: str) -> str:
+    """The name of a column with its unit, if it has one."""
+    return f"{name} [{unit}]" if unit else name
+
+
 def _apart(name: str) -> tuple[str, str]:
     found = _WITH_UNIT.fullmatch(name) if len(name) <= LONGEST_NAME else None
     if not found or (found["tight"] and not parsed(found["tight"])):  # as for p/p0

@@ -518,6 +518,23 @@ def test_units_convert_when_asked(case: Case) -> None:
     np.testing.assert_allclose(asperities.heights, HEIGHTS, rtol=1e-15)
 
 
+def test_results_say_their_units(case: Case) -> None:
+    """So that a scene in other units does not misread them."""
+    table = "scene-results/asperities.csv"
+    assert case.command("run", "scene.toml", "--no-figures").status == 0
+    said = "x [m],y [m],height [m],tip_radius [m],load [N],contact_radius [m],gap [m],status,"
+    assert Path(table).read_text().startswith(said)
+    assert case.command("verify", "scene.toml", table).status == 0
+    text = Path("scene.toml").read_text()
+    text = text.replace("summits.csv", table).replace("tip_radius", "# ")
+    Path("a.toml").write_text(text)
+    same, own = cr.read_scene("a.toml").scene.asperities, case.contact.scene.asperities
+    np.testing.assert_array_equal(same.positions, own.positions)
+    Path("a.toml").write_text(text.replace('length = "m"', 'length = "km"'))
+    with pytest.raises(cr.InputError, match="column x: found m, expected km, the scene's unit"):
+        cr.read_scene("a.toml")
+
+
 @pytest.mark.parametrize(
     ("columns", "units", "said"),
     [

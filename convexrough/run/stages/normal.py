@@ -17,7 +17,7 @@ from convexrough.normal.certificate import Certificate
 from convexrough.run.stage import Columns, Result, Stage, Summary, numbers, unit_of
 from convexrough.run.values import Finite, Positive
 from convexrough.tabular.columns import bound, labelled
-from convexrough.tabular.units import UnitNames
+from convexrough.tabular.units import UnitNames, in_unit
 
 #: `closest_change` is that of loads of at least HEAVY times the largest, reported above DIFFERENT.
 HEAVY, DIFFERENT = 0.1, 0.01
@@ -65,7 +65,9 @@ class NormalResult(Result):
         columns: Columns = {"height": asperities.heights, "tip_radius": asperities.tip_radii}
         columns |= contact.columns("loads", "contact_radii", "gaps", "status")
         columns |= contact.certificate.columns("load_errors")
-        return {"asperities": self.at_asperities(columns)}
+        units = contact.scene.units
+        return {"asperities": {in_unit(name, unit_of(name, units)): each
+                               for name, each in self.at_asperities(columns).items()}}  # fmt: skip
 
     def doubts(self) -> Iterator[str]:
         return plausibility.doubts_of(self.contact)
