@@ -112,6 +112,8 @@ def read(
                 grid = text_map(path)
             elif kind in (".npy", ".npz", ".mat"):
                 grid = map_arrays.arrays_map(path)
+                if grid.heights.ndim == 2:  # else `Surface` refuses it
+                    _refuse_coordinates(grid.heights)
             else:
                 grid = map_arrays.instrument_map(path)
         unclear = next(filter(states_scale, grid.comments), "")
@@ -217,21 +219,7 @@ def _matrix(path: Path, table: TextTable, width: int) -> HeightGrid:
         expected = "one map in a file: remove comments and empty lines between its rows"
         raise InputError("rows", found=found, expected=expected)
     heights = matrix(path, table)
-    for one, other in combinations(heights.T if width <= MOST_COLUMNS else (), 2):
-        sides = [len(np.unique(each)) for each in (one, other)]
-        if min(sides) > 2 and sides[0] * sides[1] == len(heights) > width:
-            found = f"{width} columns without a header, two of which are coordinates"
-            raise InputError("columns", found=found, expected="their names above them: x, y, z")
-    if min(heights.shape) > 2:
-        for place, lines in (("row", heights), ("column", heights.T)):
-            for number, one, other in ((1, 0, 1), (len(lines), -1, -2)):
-                line = lines[one]
-                if _even(line[1:]) and not _even(lines[other, 1:]):
-                    raise _not_heights(f"{place} {number}", line[~np.isnan(line)])
-            off, spread = lines[-1] - lines[:-1].mean(axis=0), lines[:-1].std(axis=0)
-            if (np.abs(off) < 0.01 * spread).all():
-                found = f"the means of the {'columns' if place == 'row' else 'rows'}"
-                raise InputError(f"last {place}", found=found, expected="heights alone")
+    _refuse_coordinates(heights)
     matches = filter(None, map(_SAID.fullmatch, table.comments))
     stated = [*dict.fromkeys((match[1].lower().rstrip("s"), match[2]) for match in matches)]
     if len(stated) > len(said := dict(stated)):
@@ -265,6 +253,26 @@ def _matrix(path: Path, table: TextTable, width: int) -> HeightGrid:
     lengths = [float(each.replace(",", ".")) for each in (across, upwards)]
     dy, dx = np.divide(lengths[::-1], heights.shape).tolist()
     return HeightGrid(heights, (dx, dy), unit_x, value_unit)
+
+
+def _refuse_coordinates(heights: Array) -> None:
+    """Raise InputError for a matrix with columns, or a first or last line, of other numbers."""
+    width = heights.shape[1]
+    for one, other in combinations(heights.T if width <= MOST_COLUMNS else (), 2):
+        sides = [len(np.unique(each)) for each in (one, other)]
+        if min(sides) > 2 and sides[0] * sides[1] == len(heights) > width:
+            found = f"{width} columns without a header, two of which are coordinates"
+            raise InputError("columns", found=found, expected="their names above them: x, y, z")
+    if min(heights.shape) > 2:
+        for place, lines in (("row", heights), ("column", heights.T)):
+            for number, one, other in ((1, 0, 1), (len(lines), -1, -2)):
+                line = lines[one]
+                if _even(line[1:]) and not _even(lines[other, 1:]):
+                    raise _not_heights(f"{place} {number}", line[~np.isnan(line)])
+            off, spread = lines[-1] - lines[:-1].mean(axis=0), lines[:-1].std(axis=0)
+            if (np.abs(off) < 0.01 * spread).all():
+                found = f"the means of the {'columns' if place == 'row' else 'rows'}"
+                raise InputError(f"last {place}", found=found, expected="heights alone")
 
 
 def _not_heights(place: str, line: Sequence[Any] | Array) -> InputError:

@@ -350,10 +350,8 @@ def _sheet_lines(
     with path.open("rb") as raw, foreign():
         book = openpyxl.load_workbook(raw, read_only=True, data_only=True)
         pages = {
-            page.title: [["" if cell is None else _plain(cell) for cell in row]
-                         for row in page.iter_rows(values_only=True)]
-            for page in book.worksheets
-        }  # fmt: skip
+            page.title: [*map(_plain, page.iter_rows(values_only=True))] for page in book.worksheets
+        }
 
     def value(rows: list[list[str]]) -> tuple[int, int]:
         names = {bare(cell).lower() for row in rows[:SAMPLE] for cell in row}
@@ -389,10 +387,15 @@ def _holds_map(rows: Iterable[Sequence[str]]) -> bool:
     return len([*islice((row for row in rows if numbers(row) >= 3), 3)]) == 3
 
 
-def _plain(cell: Any) -> str:
-    """The text of a cell, on one line, without quotes and with a decimal point."""
-    text = " ".join(str(cell).replace('"', "").split())
-    return text if Style("\t", ",").number(text) is None else text.replace(",", ".")
+def _plain(row: Sequence[Any]) -> list[str]:
+    """The texts of cells, each on one line, without quotes and with a decimal point. Beside numbers
+    a text such as 1,257 is left as it is, since its comma may separate thousands."""
+    texts = [" ".join(str("" if cell is None else cell).replace('"', "").split()) for cell in row]
+    number, doubtful = Style("\t", ",").number, any(isinstance(cell, float) for cell in row)
+    return [
+        text if number(text) is None or (doubtful and PERHAPS_GROUPED.fullmatch(text))
+        else text.replace(",", ".") for text in texts
+    ]  # fmt: skip
 
 
 def _encoding(path: Path, raw: BufferedReader[Any]) -> str:

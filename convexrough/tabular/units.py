@@ -140,6 +140,8 @@ def _apart(name: str) -> tuple[str, str]:
 
 def known_unit(what: str, name: str, kind: str = "length") -> Unit | None:
     """The unit `name`; None for "". Raises InputError about `what` if it is no unit of `kind`."""
+    if not isinstance(name, str):
+        raise InputError(what, found=repr(name), expected='a name, as "mm"')
     if not name.strip():
         return None
     expected, unit = f"a unit of {kind}", parsed(name)
@@ -173,8 +175,6 @@ class UnitNames(NamedTuple):
         if not isinstance(names, tuple) or len(names) != 2:
             raise InputError("units", found=repr(names), expected='two names, as ("mm", "N")')
         for kind, name in zip(cls._fields, names, strict=True):
-            if not isinstance(name, str):
-                raise InputError(f"units, {kind}", found=repr(name), expected='a name, as "mm"')
             known_unit(f"units, {kind}", name, kind)
         return cls(*(name.strip() for name in names))
 

@@ -72,6 +72,9 @@ def test_arrays(tmp_path: Path) -> None:
         (nano, "height_unit: found µm, expected nm, as the file says"),
         *(({"heights": np.zeros(shape), "pixel": 1.0}, "heights: found shape .* at least 3 of each")
           for shape in ((0, 5), (5, 0), (0,))),
+        (sides | {"heights": np.vstack((X[:1], HEIGHTS))}, "row 1: found numbers 0, 1, 2, ..., e"),
+        ({"a": np.array([(i, j, i % 2, 5) for i in range(9) for j in range(7)])},
+         "columns: found 4 columns without a header, two of which are coordinates"),
         (sides | {"note": "heights in nm"}, "comments: found note: heights in nm, expected"),
     ):  # fmt: skip
         with pytest.raises(cr.InputError, match=said):
@@ -240,6 +243,7 @@ WRONG: list[tuple[str, dict[str, Any], str]] = [
     ("# x y quality\n0,0,1\n1,0,2\n", ONE, "columns: found x, y, quality, expected a column"),
     (INDEXED, ONE, "columns: found 4 columns without a header, two of which are coordinates"),
     ("@", {"pixel": (1.0, 30.0)}, "found 1 by 30, expected sides at most 1 to 10"),
+    ("@", ONE | {"unit": 5}, "unit: found 5, expected a name, as"),
     ("@", ONE | {"unit": "parsec"}, "unit: found 'parsec', expected a unit of le"),
     ("@", ONE | {"height_unit": "nm"}, "unit: found none, expected the unit of"),
     ("# Width: 9 µm\n# Height: 7 µm\n@", {"unit": "nm"}, "unit: found nm, expected "),

@@ -316,6 +316,11 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "ranks": (lambda case: {"load": case.loads, "rank": case.order + 1}, "",
               "column rank: found each index once, expected the scene's order and no such column, ",
               "--column index=rank"),
+    "a column of two names": (Case.table, "a.csv --column x=load",
+                              "columns: found 'load' as load and as x, expected a column for each"),
+    "a text that may have separators of thousands": (
+        lambda case: [[*cells(case.table())[:-1], [0.5, 0.5, "1,257"]]], "a.xlsx",
+        "column load: found '1,257', expected a decimal point, not a comma, and no thousands sep"),
     "two indices": (lambda case: shuffled(case, 1) | {"asperity": np.arange(COUNT)[::-1]}, "",
                     "columns index, asperity: found asperities ", "expected one index: --column i"),
     "an index from who knows where": (lambda _: {"index": [3, 4, 5], "load": [1, 2, 3]}, "",
