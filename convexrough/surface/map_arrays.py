@@ -15,6 +15,7 @@ from convexrough.arrays import Array, Indices
 from convexrough.errors import ConvexroughError, FileError, InputError
 from convexrough.surface.surface import checked_pixel
 from convexrough.tabular.arrays import named_arrays, parts
+from convexrough.tabular.roles import shortened
 from convexrough.tabular.units import bare, one_unit, unit
 
 #: Names of arrays of an .npz or .mat file: of the heights; of the pixel and the units; and parts of
@@ -63,7 +64,7 @@ def arrays_map(path: Path) -> HeightGrid:
     if others:
         expected = f"{', '.join(STATED)}, x, y and no other numbers beside heights, in which nan "
         expected += "marks holes"
-        raise InputError("arrays", found=", ".join(others), expected=expected)
+        raise InputError("arrays", found=shortened(", ".join(others)), expected=expected)
     size = checked_pixel(np.squeeze(named["pixel"])) if "pixel" in named else None
     said, height_unit = (" ".join(map(str, parts(named.get(name, ())))) for name in STATED[1:])
     if upwards := one_unit("height_unit", height_unit, unit(chosen)):

@@ -319,8 +319,11 @@ def _unlisted(header: TextRow, rows: list[TextRow], first: int, style: Style) ->
         else:
             while kept and title(kept[-1]):
                 kept.pop()
-    last = max((i for i, row in enumerate(kept) if any(numbers(row)[:1])), default=len(kept))
-    closing = (i for i, row in enumerate(kept) if i > last and (title(row) or totals(row.cells)))
+    led = [any(numbers(row)[:1]) for row in kept]
+    count = [*led, False].index(False)
+    if not count or any(led[count:]):  # words in front are labels or slips
+        return kept
+    closing = (i for i, row in enumerate(kept) if not led[i] and (title(row) or totals(row.cells)))
     return kept[: next(closing, None)]
 
 

@@ -69,7 +69,7 @@ _POWERS = str.maketrans("⁻¹²³μ−", "-123µ-")
 #: mark, "in" or a word such as "unit", because they can also be words or symbols.
 _IN_TEXT = re.compile(
     r"(?<![^\W\d])((?i:nm|µm|μm|mm|Å|[aå]ngstr[oö]ms?|microns?|inch(?:es)?|mils?|thou|feet|ft"
-    r"|(?:pico|nano|mi[ck]ro|milli|[cz]enti)met(?:er|re)[sn]?)|cm|[nµμmkM]N|kgf|lbf)(?!\w)"
+    r"|(?:pico|nano|mi[ck]ro|milli|[cz]enti)met\w+)|cm|[nµμmkM]N|kgf|lbf)(?!\w)"
     r"|(?:[\d(\[,:=]\s*|\b[Ii]n\s+|\b(?i:units?|einheit(?:en)?|length)\b[\s;:=]*)"
     r"((?i:um|met(?:er|re)[sn]?)|[mN])(?![\w/]|\s*=)"
     r"|(纳米|微米|毫米)"

@@ -315,7 +315,7 @@ def test_an_esri_grid(tmp_path: Path, width: int) -> None:
         *("ZCal: 0.5", "Gain: 0.5", "heights multiplied by two", "Mult 2", "heights in waves"),
         *("z in counts", "volts", "z * 1000", "Faktor 0,5", "heights x1000", "LSB=0.1", "inverted"),
         *("heights in mils", "height unit: inch", "raw / 100", "raw x 0.01", "z offset = 5"),
-        *("values times ten", "in metres", "um", "Mikrometer", "in picometres", "in Ångström"),
+        *("values times ten", "in metres", "um", "Mikrometer", "in picometres", "micrometri"),
         *("Depth (positive down)", "Z axis points down"),
         *("高度: 128.0 微米", "z unit: nm; pixel size 1 um", "in um", "z [um]"),
     ],

@@ -60,7 +60,7 @@ FILES = {
     "typographic minus": "x,y,load\n0,0,1.5\n1,\N{MINUS SIGN}0,0\n0.5,2.5,2.5e\N{MINUS SIGN}5\n",
     "one column, decimal comma": "load\n1,5\n0\n2,5e-5\n",
     "numbers alone": "1.5\n0\n2.5e-5\n",
-    "words first, between spaces": "site x y load\nt1 0 0 1.5\nNA 1 0 0\nmid 0.5 2.5 2.5e-5\n",
+    "words first, between spaces": "site x y load\n7 0 0 1.5\nNA 1 0 0\nmid 0.5 2.5 2.5e-5\n",
 }
 
 
@@ -298,6 +298,7 @@ WRONG_SUMMITS = [
     ('x,y\n0,"1\n', 'row 2: found quotes that do not end on this line: 0,"1'),
     ('x y\n0 "0\n1 1\n2 2\n', 'row 2: found quotes that do not end on this line: 0 "0'),
     ("z x y\n0 1 0\nbad 0 1\nNA 2 2\n", "row 3, column height: found 'bad', expected a finite num"),
+    ("id x y\na 1 1\n5 0 1\nSum 0 1\nb 2 2\n", 'row 4: found a row of "Sum", expected none: re'),
     ("z x y\nno value 0 0\n0 1 1\n", "row 2: found 4 cells, expected 3, as in the header"),
     *((f"x{mark}y\n0{mark}0\n{error}{mark}1\n1{mark}1\n", f"row 3, column x: found '{error}', exp")
       for error in ("#NV", "#¡VALOR!", "#ÜBERLAUF!", "####") for mark in ";\t "),
