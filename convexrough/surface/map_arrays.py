@@ -115,16 +115,14 @@ def instrument_map(path: Path) -> HeightGrid:
     path.open("rb").close()  # raises the usual error for a missing file
     try:
         with open_topography(str(path)) as reader:
-            maps = reader.height_channels
+            maps = [channel for channel in reader.height_channels if channel.dim == 2]
             if len(maps) != 1:
-                found = ", ".join(channel.name for channel in maps) or "no heights"
+                found = ", ".join(channel.name for channel in maps) or "none"
                 expected = "one map of heights; export it alone, as text for example"
                 raise InputError("file", found=found, expected=expected)
             sized = maps[0].physical_sizes is not None
             sizes = {} if sized else {"physical_sizes": maps[0].nb_grid_pts}
             topography = reader.topography(channel_index=maps[0].index, **sizes)
-            if topography.dim != 2:
-                raise InputError("file", found="a line scan", expected="a map")
             heights = np.ma.filled(np.ma.asarray(topography.heights(), dtype=np.float64), np.nan)
     except (OSError, ConvexroughError):
         raise

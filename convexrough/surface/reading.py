@@ -318,6 +318,6 @@ def _list(path: Path, cells: TextTable, width: int) -> HeightGrid:
 def _is_label(name: str, cells: NDArray[Any]) -> bool:
     """True for a column that cannot change heights: an index, or the same text in every row."""
     count = len(np.unique(cells))
-    if is_index(name):
-        return count == len(cells)
+    if is_index(name) and count == len(cells):
+        return True
     return count == 1 and cells.dtype.kind == "U" and not map_arrays.SCALES.search(name)

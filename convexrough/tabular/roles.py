@@ -121,11 +121,9 @@ def places_of(
             if not alike:
                 mistakes.append(f"columns: found {found}, expected a column {called!r}")
         if alike:
-            other = next((it for it in places if places[it] == alike[0]), "")
+            mistakes += [f"columns: found {bared[place]!r} as {it} and {name}, expected one each"
+                         for it, place in places.items() if place == alike[0]]  # fmt: skip
             places[name] = alike[0]
-            if other:
-                said = f"{bared[alike[0]]!r} as {other} and as {name}"
-                mistakes.append(f"columns: found {said}, expected a column for each")
         if len(alike) > 1:
             choice = f": --column {name}={bared[alike[0]]}" if how.scalable else ""
             several = [*dict.fromkeys(bared[i] for i in alike)]

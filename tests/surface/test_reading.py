@@ -172,6 +172,8 @@ def test_the_only_sheet_with_a_map(tmp_path: Path) -> None:
             raw(path, [sheet, (HEIGHTS > 0).tolist()], pixel=1.0)
         with pytest.raises(cr.InputError, match="comments: found Pixel 0"):
             raw(path, [sheet, [["Pixel", 0.5]]], pixel=1.0)
+    beside = [[None, *row] for row in points]  # as from column B on
+    assert_allclose(raw(path, [beside]).heights, HEIGHTS)
     titled = [["Surface map"], [], *HEIGHTS.tolist()]
     assert_allclose(raw(path, [titled], pixel=1.0).heights, HEIGHTS)
     with pytest.raises(cr.FileError, match=f"found no map {both}"):

@@ -317,7 +317,7 @@ REFUSED: dict[str, tuple[Any, ...]] = {
               "column rank: found each index once, expected the scene's order and no such column, ",
               "--column index=rank"),
     "a column of two names": (Case.table, "a.csv --column x=load",
-                              "columns: found 'load' as load and as x, expected a column for each"),
+                              "columns: found 'load' as load and x, expected one each"),
     "a text that may have separators of thousands": (
         lambda case: [[*cells(case.table())[:-1], [0.5, 0.5, "1,257"]]], "a.xlsx",
         "column load: found '1,257', expected a decimal point, not a comma, and no thousands sep"),
