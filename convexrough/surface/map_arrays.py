@@ -44,7 +44,7 @@ class HeightGrid(NamedTuple):
     unit: str = ""  # of the pixel
     height_unit: str = ""
     comments: tuple[str, ...] = ()  # those that `read` does not understand
-    sheet: str = ""  # the name of the sheet of a workbook, in quotes
+    part: str = ""  # which part of the file it is, if the file has several
 
 
 def arrays_map(path: Path) -> HeightGrid:
@@ -104,7 +104,7 @@ def _numbers(values: NDArray[np.generic]) -> Array:
 
 
 def instrument_map(path: Path) -> HeightGrid:
-    """The only map of heights in a file that SurfaceTopography can read."""
+    """The first map of heights in a file that SurfaceTopography can read."""
     try:
         with catch_warnings(action="ignore", category=ImportWarning):  # MPI is optional
             from SurfaceTopography import open_topography
@@ -116,10 +116,11 @@ def instrument_map(path: Path) -> HeightGrid:
     try:
         with open_topography(str(path)) as reader:
             maps = [channel for channel in reader.height_channels if channel.dim == 2]
-            if len(maps) != 1:
-                found = ", ".join(channel.name for channel in maps) or "none"
-                expected = "one map of heights; export it alone, as text for example"
-                raise InputError("file", found=found, expected=expected)
+            if not maps:
+                expected = "a map of heights; export it as text, for example"
+                raise InputError("file", found="no such map", expected=expected)
+            names = ", ".join(channel.name for channel in maps)
+            part = f"the first of its maps {names}" if len(maps) > 1 else ""
             sized = maps[0].physical_sizes is not None
             sizes = {} if sized else {"physical_sizes": maps[0].nb_grid_pts}
             topography = reader.topography(channel_index=maps[0].index, **sizes)
@@ -134,9 +135,9 @@ def instrument_map(path: Path) -> HeightGrid:
         raise FileError(f"{path}: SurfaceTopography cannot read it: {reason}") from error
     unit, heights = str(topography.unit or ""), heights.T.copy()
     if not sized:
-        return HeightGrid(heights, height_unit=unit)
+        return HeightGrid(heights, height_unit=unit, part=part)
     dx, dy = np.divide(topography.physical_sizes, heights.shape[::-1]).tolist()
-    return HeightGrid(heights, (dx, dy), unit, unit)
+    return HeightGrid(heights, (dx, dy), unit, unit, part=part)
 
 
 def refuse_other(

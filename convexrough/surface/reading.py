@@ -143,7 +143,7 @@ def read(
             raise InputError("pixel", found="none", expected=expected)
         map_arrays.refuse_other(sizes[-1], sizes[0], SAME, "as the file states, or none given")
         name = length.name if length else ""
-        source = f"{path}, sheet {grid.sheet}" if grid.sheet else str(path)
+        source = ", ".join(filter(None, (str(path), grid.part)))
         surface = Surface(heights, sizes[0], name, (), holes, source, grid.comments)
         surface = surface if detrend is None else surface.detrend(detrend)
         slope = surface.rms_slope
@@ -194,7 +194,8 @@ def text_map(path: Path) -> HeightGrid:
     used = (_SAID, _ESRI) if read is _matrix else (_SAID,)
     unread = [each for each in table.comments if not any(it.fullmatch(each) for it in used)]
     unread = [each for each in unread if each.strip("#%; ") and each.lstrip("#% ") != header]
-    return read(path, table, width)._replace(comments=tuple(unread), sheet=table.style.sheet)
+    part = f"sheet {table.style.sheet}" if table.style.sheet else ""
+    return read(path, table, width)._replace(comments=tuple(unread), part=part)
 
 
 def states_scale(comment: str) -> bool:

@@ -60,7 +60,8 @@ def totals(cells: Sequence[str]) -> str:
 
 #: Words for heights that are no lengths, or that grow downwards.
 CHANGED = re.compile(
-    r"\b(counts|digits|volts?|mV|waves|fringes|inverted|depths?|down|downwards|multiplied|divided)\b",
+    r"\b((?<!\d )(?:counts|digits)|volts?|mV|waves|fringes|inverted|depths?|down|downwards"
+    r"|multiplied|divided)\b",
     re.I,
 )
 

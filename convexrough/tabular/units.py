@@ -68,10 +68,10 @@ _POWERS = str.maketrans("⁻¹²³μ−", "-123µ-")
 #: A unit of length or force in a sentence. "um", "m", "metre" and "N" count only after a digit, a
 #: mark, "in" or a word such as "unit", because they can also be words or symbols.
 _IN_TEXT = re.compile(
-    r"(?<![^\W\d])((?i:nm|µm|μm|mm|Å|[aå]ngstr[oö]ms?|microns?|inch(?:es)?|mils?|thou|feet|ft"
+    r"(?<![^\W\d])((?i:nm|µm|μm|mm|Å|[aå]ngstr[oö]ms?|microns?|inch(?:es)?|mils?|thou|feet"
     r"|(?:pico|nano|mi[ck]ro|milli|[cz]enti)met\w+)|cm|[nµμmkM]N|kgf|lbf)(?!\w)"
     r"|(?:[\d(\[,:=]\s*|\b[Ii]n\s+|\b(?i:units?|einheit(?:en)?|length)\b[\s;:=]*)"
-    r"((?i:um|met(?:er|re)[sn]?)|[mN])(?![\w/]|\s*=)"
+    r"((?i:um|ft|met(?:er|re)[sn]?)|[mN])(?![\w/]|\s*=)"
     r"|(纳米|微米|毫米)"
 )
 
