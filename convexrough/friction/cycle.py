@@ -321,10 +321,10 @@ def _loop(cycle: Cycle, way: Sequence[Fraction], chosen: Indices) -> Loop:
     checks.fits_in_memory("points", len(path), 200 * len(cycle.scene), noun="levels")
     walk, loop = Walk(levels, cycle._walk.start, path, steps=1), slice(len(past), None)
     if general is None:
-        states, some = states_of(levels, walk.curves[loop], chosen), np.arange(len(chosen))
+        states = states_of(levels, walk.curves[loop], chosen)
     else:
-        states, some = States(*(each[loop] for each in walk.states())), chosen
+        states = States(*(each[loop] for each in walk.states(chosen)))
     loaded = levels.loads[chosen] > 0
     forces, displacements = states.forces.value, states.asperity_displacements.value
-    own = (frozen(np.where(loaded, it[:, some], 0.0)) for it in (forces, displacements))
+    own = (frozen(np.where(loaded, it, 0.0)) for it in (forces, displacements))
     return Loop(chosen, walk.forces[loop], frozen(states.displacements.value), *own)

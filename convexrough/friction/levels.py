@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from convexrough import checks
 from convexrough.arithmetic.balls import TINY, Ball, of_rows
 from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair
-from convexrough.arrays import Array, among_zeros, frozen
+from convexrough.arrays import Array, Indices, among_zeros, frozen
 from convexrough.contact import Contact, levels_of
 from convexrough.errors import InputError, ProofError
 from convexrough.friction.order import MOST, Order, order_between
@@ -136,21 +136,25 @@ class FrictionLevels:
             self._ordered = min(asked)
         return found
 
-    def depths(self, load: Fraction) -> Array:
-        """(N,) [length] indentations at a load; minus the gap where an asperity is open."""
-        return self.indentations(self.at(load)).value * self.units.length
+    def depths(self, load: Fraction, which: Indices | slice = slice(None)) -> Array:
+        """[length] indentations at a load, minus the gap where open; as in `indentations`."""
+        return self.indentations(self.at(load), which).value * self.units.length
 
-    def indentations(self, level: Level) -> Ball:
-        """(N,) the indentations n_i of a level; in float64 for asperities that cannot touch."""
+    def indentations(self, level: Level, which: Indices | slice = slice(None)) -> Ball:
+        """The indentations n_i of a level for the asperities `which`, by default all. Those of
+        asperities that cannot touch are in float64, and take most of the time.
+        """
         known: Ball = of_rows(self.to_scene, level.indentation)
         problem, state = self._levels.problem, level.trial
+        if (problem.places[which] >= 0).all():
+            return known[which]
         loads = np.zeros(len(problem)) if state is None else state.loads.high
         n, off = problem.beyond(loads, float(level.approach.value))
         if len(n):
             others, coupling = problem.screened
             off += float(level.approach.error) + (0.0 if state is None else level.moves(coupling))
             known.mid.high[others], known.radius[others] = n, off
-        return Ball(known.mid, known.radius * (1 + SAFETY))
+        return Ball(known.mid, known.radius * (1 + SAFETY))[which]
 
     def to_scene(self, values: NDArray[Any]) -> NDArray[Any]:
         """(..., N) the values (..., n) of the candidates, with 0 for all other asperities."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
-from convexrough.arithmetic.balls import Ball
+from convexrough.arithmetic.balls import Ball, of_rows
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
@@ -208,7 +208,8 @@ def shear(
             height = _by_steps(levels, abs(displacement))
         height = height if displacement >= 0 else -height
     walk = Walk(levels, start, [(P, height)])
-    order, (moved, carried, asperities, drifts) = walk.order, (each[0] for each in walk.states())
+    order, (moved, *each) = walk.order, (it[0] for it in walk.states(levels.candidates))
+    carried, asperities, drifts = (of_rows(levels.to_scene, it) for it in each)
     if walk.general is not None:
         squared = contact.scene.relative_radii * walk.general.fronts[0]
         radii, radius_errors = np.where(loaded, np.sqrt(squared), 0.0), np.zeros(len(loaded))

@@ -80,14 +80,14 @@ def displacements_of(levels: FrictionLevels, sums: LevelSums) -> Ball:
 
 
 def states_of(
-    levels: FrictionLevels, curves: Sequence[MemoryCurve], which: Indices | None = None
+    levels: FrictionLevels, curves: Sequence[MemoryCurve], which: Indices | slice = slice(None)
 ) -> States:
     """The states of these curves, for the asperities `which` in this order; default all."""
-    sums, some = LevelSums.of(curves), slice(None) if which is None else which
+    sums = LevelSums.of(curves)
     levels.prepare(sums.used)
     solved, travel = [levels.at(load) for load in sums.used], levels.travel_unit
-    loads = Ball.stacked([of_rows(levels.to_scene, level.loads)[some] for level in solved])
-    moved = Ball.stacked([levels.indentations(level)[some] for level in solved])
+    loads = Ball.stacked([of_rows(levels.to_scene, level.loads)[which] for level in solved])
+    moved = Ball.stacked([levels.indentations(level, which) for level in solved])
     return States(
         displacements_of(levels, sums),
         sums.total(loads) * levels.force_unit,

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from convexrough import checks
 from convexrough.arithmetic.balls import Ball
-from convexrough.arrays import Array, frozen
+from convexrough.arrays import Array, Indices, frozen
 from convexrough.errors import InputError
 from convexrough.friction.curve import MemoryCurve, Piece, Point
 from convexrough.friction.general_step import SteppedPath, Stepper, followed
@@ -96,11 +96,12 @@ class Walk:
             return None
         return followed(self.levels, self.start, self.points, self.steps, self.stepper)
 
-    def states(self) -> States:
-        """The states at the m points."""
+    def states(self, which: Indices | slice = slice(None)) -> States:
+        """The states at the m points, for the asperities `which`, by default all."""
         if self.general is not None:
-            return self.general.states
-        found = states_of(self.levels, self.curves)
+            moved, *each = self.general.states
+            return States(moved, *(values[:, which] for values in each))
+        found = states_of(self.levels, self.curves, which)
         if self.order == "fails":
             return States(*(Ball.around(each.mid, np.inf) for each in found))
         return found
