@@ -87,7 +87,7 @@ def solve(
     then also ends if the next step is expected to leave no more. After `most` steps the larger of
     `tolerance` and `accurate` suffices.
     """
-    before, doubt = np.inf, 1.0  # the 2-norm of the last defect
+    before = np.inf  # the 2-norm of the last defect
     for step in range(1, most + 1):
         log_step(law.solver, step, state.energy, _relative(state))
         near = state.residual <= accurate * state.scale
@@ -98,9 +98,7 @@ def solve(
         expected = (size / before) ** 2 if before < np.inf else 1.0
         if expected * size <= linear:
             return state, step - 1
-        if size > 0.5 * before:  # the estimate of what a step leaves may be poor
-            doubt *= 0.1
-        forcing = doubt * min(MOST_LEFT, expected)
+        forcing = min(MOST_LEFT, expected)
         enough = max(state.noise / size, tolerance * state.scale / state.residual)
         direction = law.direction(state, max(forcing, OVERSOLVED * enough))
         following = descend(law, state, direction)

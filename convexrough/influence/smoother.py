@@ -39,10 +39,11 @@ MOST_SHARING, MOST_CELLS, WIDEST_GAP = 4.0, 32, 8
 LEAST = 0.2
 
 
-def smoother_of_points(points: Array, scale: float, root: Array) -> Smoother:
+def smoother_of_points(points: Array, scale: float, root: Array) -> Smoother | None:
     """M for asperities at arbitrary points, on square cells with about one asperity on average.
 
-    If points are in clusters, cells are smaller, and wide empty strips are left out.
+    If points are in clusters, cells are smaller, and wide empty strips are left out. None if there
+    would be too many cells: means over cells with whole clusters are a poor estimate.
     """
     away, n = points - points.min(axis=0), len(points)
     width, height = away.max(axis=0).tolist()
@@ -51,7 +52,7 @@ def smoother_of_points(points: Array, scale: float, root: Array) -> Smoother:
     while _mean_sharing(cells) > MOST_SHARING:
         finer = _packed_cells(away / (0.5 * side))
         if np.prod(finer.max(axis=1) + 1) > MOST_CELLS * n:
-            break
+            return None
         side, cells = 0.5 * side, finer
     return block_smoother(cells, np.eye(2), scale / side, root)
 
