@@ -190,7 +190,15 @@ def _iterate(
     p = z.copy()
     squared = float(residual @ z)  # r' M r
     products = 0
-    while left > enough and squared > (ENERGY * limit) ** 2 * first and products < MOST_ITERATIONS:
+    lacking = 1.0  # factor by which `left` may be too small
+    while squared > (ENERGY * limit) ** 2 * first and products < MOST_ITERATIONS:
+        if lacking * left <= enough:
+            if not smooth or influence.even:
+                break
+            exact = float(np.linalg.norm(influence.apply(w * residual)))
+            if exact <= enough:
+                break
+            lacking = 2.0 * exact / left
         q = influence.apply(w * p)
         products += 1
         bent = w * q

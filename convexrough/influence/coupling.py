@@ -90,6 +90,8 @@ class Influence(Coupling):
     name: ClassVar[Kind]
     #: True if the matrix is stored; if False, products with float32 loads are cheaper.
     stored: ClassVar[bool] = False
+    #: True if points are nowhere far denser than elsewhere, so that estimates by `smoother` hold.
+    even: ClassVar[bool] = False
     #: True if `sums` takes only a few times as long as `apply`. Then Newton's method may end early,
     #: and `normal.refine` makes the last steps with `sums`.
     cheap_sums: ClassVar[bool] = False

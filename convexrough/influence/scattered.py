@@ -126,7 +126,7 @@ class ScatteredInfluence(coupling.Influence):
             return MeshSums(self._double)
         return MatrixSums(*coupling.known(self.points, self.tails, self.point_error))
 
-    def smoother(self, root: Array) -> coupling.Smoother | None:
+    def smoother(self, root: Array) -> coupling.Smoother:
         return smoother_of_points(self.points, self.scale, root)
 
     @property

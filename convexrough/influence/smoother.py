@@ -39,11 +39,10 @@ MOST_SHARING, MOST_CELLS, WIDEST_GAP = 4.0, 32, 8
 LEAST = 0.2
 
 
-def smoother_of_points(points: Array, scale: float, root: Array) -> Smoother | None:
+def smoother_of_points(points: Array, scale: float, root: Array) -> Smoother:
     """M for asperities at arbitrary points, on square cells with about one asperity on average.
 
-    If points are in clusters, cells are smaller, and wide empty strips are left out. None if there
-    would be too many cells: means over cells with whole clusters are a poor estimate.
+    If points are in clusters, cells are smaller, and wide empty strips are left out.
     """
     away, n = points - points.min(axis=0), len(points)
     width, height = away.max(axis=0).tolist()
@@ -52,7 +51,7 @@ def smoother_of_points(points: Array, scale: float, root: Array) -> Smoother | N
     while _mean_sharing(cells) > MOST_SHARING:
         finer = _packed_cells(away / (0.5 * side))
         if np.prod(finer.max(axis=1) + 1) > MOST_CELLS * n:
-            return None
+            break
         side, cells = 0.5 * side, finer
     return block_smoother(cells, np.eye(2), scale / side, root)
 

@@ -110,6 +110,18 @@ def test_newton_converges_from_any_start(sampled: Case, seed: int, size: float) 
         assert_allclose(again.loads, contact.loads, rtol=1e-9, atol=1e-12 * contact.loads.max())
 
 
+def test_newton_converges_where_distances_are_graded() -> None:
+    """Along a geometric line: blocks average over whole parts, and estimates are far too low."""
+    i = np.arange(2600)
+    points = np.column_stack((np.exp(12.0 * i / len(i)), 1e-9 * i))
+    tips = 0.2 * np.gradient(points[:, 0])
+    scene = cr.Scene(np.inf, cr.Asperities(points, tips), scenes.MATERIAL)
+    contact = cr.press(scene, approach=1e-3)
+    assert contact.influence == "scattered"
+    assert contact.iterations < 12
+    assert contact.certificate.scope == "global"
+
+
 @pytest.mark.parametrize("size", [1e-2, 1e-3])
 def test_newton_converges_where_a_cluster_is_far_smaller_than_the_scene(size: float) -> None:
     """The preconditioner, which averages over blocks, says nothing about such a cluster."""
