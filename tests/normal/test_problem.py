@@ -112,11 +112,13 @@ def test_newton_converges_from_any_start(sampled: Case, seed: int, size: float) 
 
 def test_newton_converges_where_distances_are_graded() -> None:
     """Along a geometric line: blocks average over whole parts, and estimates are far too low."""
-    i = np.arange(2600)
-    points = np.column_stack((np.exp(12.0 * i / len(i)), 1e-9 * i))
-    tips = 0.2 * np.gradient(points[:, 0])
-    scene = cr.Scene(np.inf, cr.Asperities(points, tips), scenes.MATERIAL)
-    contact = cr.press(scene, approach=1e-3)
+    random, n = np.random.default_rng(0), 2600
+    x = np.exp(12.0 * np.arange(n) / n)
+    gaps = np.diff(x)
+    approach = 1e-3 * float(np.median(gaps))
+    heights = -approach * 10 ** (7.0 * random.random(n) - 6.0)
+    line = cr.Asperities(np.column_stack((x, 0 * x)), (0.45 * gaps[0]) ** 2 / approach, heights)
+    contact = cr.press(cr.Scene(x[-1] ** 2 / approach, line, scenes.MATERIAL), approach=approach)
     assert contact.influence == "scattered"
     assert contact.iterations < 12
     assert contact.certificate.scope == "global"
