@@ -65,12 +65,18 @@ class _Reporting(click.Command):
         parts = (each.split("=", 1) if each.startswith("--junit=") else [each] for each in args)
         words = [*chain(*parts)]
         earlier = Path(dict(pairwise(words)).get("--junit", ""))
-        times = [Path(each).resolve() for each in words].count(earlier.resolve())  # 2 for an input
         runs = "--force" in words and not {"--help", "-h"} & {*words} and not ctx.resilient_parsing
-        if runs and times == 1 and earlier.suffix.lower() == ".xml":
+        if runs and _is_report(earlier):
             with suppress(OSError):  # `verify` reports it
                 earlier.unlink(missing_ok=True)
         return super().parse_args(ctx, args)
+
+
+def _is_report(path: Path) -> bool:
+    """True for a file that begins as a JUnit report does. No other file is replaced by one."""
+    with suppress(OSError), path.open("rb") as file:
+        return b"<testsuite" in file.read(200)
+    return False
 
 
 @click.command(cls=_Reporting)
@@ -144,8 +150,11 @@ def verify(
         raise FileError(f"--junit {junit}: found {junit.suffix or 'no ending'}, expected .xml")
     alone = [Path("proof.json")] if output.proof and output.out is None else []
     for each in [*alone, *([junit] if junit else [])]:
-        if each.resolve() in (it.resolve() for it in (scene, loads, shear) if it):
-            raise FileError(f"{each}: found an input, expected another file to write")
+        same = (it for it in (scene, loads, shear) if it and it.exists() and each.exists())
+        if any(map(each.samefile, same)) or (
+            each == junit and each.exists() and not _is_report(each)
+        ):
+            raise FileError(f"{each}: found no earlier report, expected another file to write")
         if each.exists() and not output.force:
             raise FileError(f"{each}: exists already; --force replaces it")
         with file_errors(each, "be written"):

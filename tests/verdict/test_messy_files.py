@@ -666,15 +666,19 @@ def test_findings_as_junit(case: Case) -> None:
     assert said in outcome.err
     # An earlier report remains only without --force.
     for wrong in ("--junit=b.xml", "--nope --junit b.xml", "loads.csv --junit b.xml --explain"):
-        Path("b.xml").touch()
+        Path("b.xml").write_text("<testsuites/>")
         for force in ("", "--force"):
             assert case.command("verify", "scene.toml", *f"{wrong} {force}".split()).status == 2
             assert Path("b.xml").exists() == (not force)
     for name, option in (("c.xml", "--junit c.xml"), ("proof.json", "--proof")):  # an input stays
         kept = lines({"load": case.loads})
         outcome = case.verify(kept, *option.split(), "--force", name=name)
-        assert outcome.refuses(f"{name}: found an input, expected another file to write")
+        assert outcome.refuses(f"{name}: found no earlier report, expected another file")
         assert Path(name).read_text() == kept
+    Path("q.xml").write_text("force\n0\n")
+    options = "--shear=q.xml", "--shear-force", "0", "--junit", "q.xml", "--force"
+    assert case.verify({"load": case.loads}, *options).refuses("q.xml: found no earlier report")
+    assert Path("q.xml").read_text() == "force\n0\n"
 
 
 def test_bytes_of_every_kind_end_in_a_reason(case: Case) -> None:
