@@ -33,8 +33,8 @@ from convexrough.sphere import hertz
 STATUSES = np.array(["undecided", "contact", "open"])
 TOUCHING, OPEN = 1, 2
 
-#: For at most this many asperities that can touch, contacts and certificates keep operators: those
-#: for what friction needs of the press, these for the gaps of the other asperities.
+#: For at most this many asperities that can touch, a contact keeps the operator for friction, and a
+#: certificate for the gaps of the other asperities.
 MOST_KEPT = {"dense": ALL_SHARP, "lattice": 2**19, "scattered": 2**16}
 
 #: If no contact radius of a solution exceeds this fraction of the distance to the nearest
@@ -104,11 +104,14 @@ class Certificate(Proved):
     obstacle: str = ""
 
     def __getstate__(self) -> dict[str, Any]:
-        return super().__getstate__() | {"_depths": partial(tuple, self._known_depths)}
+        self._known_depths  # noqa: B018, a pickle has no operator
+        return super().__getstate__()
 
     @cached_property
     def _known_depths(self) -> tuple[Array, ...]:
-        return self._depths()
+        found = self._depths()
+        object.__setattr__(self, "_depths", partial(tuple, found))  # and no longer the operator
+        return found
 
     @cached_property
     def gaps(self) -> Array:
@@ -291,9 +294,10 @@ class Depths:
     error: Array  # error bounds of these; infinite if nothing is proved
 
     def kept(self) -> Callable[[], tuple[Array, ...]]:
-        """These depths or, if that would keep a large operator, a function that returns them."""
-        few = len(self.problem) <= MOST_KEPT[self.problem.influence.name]
-        return self if few else partial(tuple, self())
+        """These depths or, if all can touch or the operator is large, a function that has them."""
+        n = len(self.problem)
+        later = n < len(self.problem.scene) and n <= MOST_KEPT[self.problem.influence.name]
+        return self if later else partial(tuple, self())
 
     def __call__(self) -> tuple[Array, ...]:
         """(N,) [length] indentations of all asperities of the scene, and their error bounds."""

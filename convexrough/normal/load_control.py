@@ -63,7 +63,7 @@ def approach_bound(
     It is (2) of docs/theory/certificate.md with q = weights / sum(weights), and with a lambda close
     to the one for which (2) is least. In the code, c is A q and alpha is q k.
 
-    weights      : (n,) approximate loads, not negative, not all 0
+    weights      : (n,) not negative, not all 0
     displacement : (n,) upper bounds on A times weights
     coefficients, offsets : (n,) k, and lower bounds on d
     load         : L; for m problems, L and the bound are (m, 1) and the other arrays (m, n)
@@ -101,15 +101,16 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
     under these would reach their nearest neighbours, the loads are reduced, as the bound would be
     useless.
     """
-    bound, distances = np.nan, np.hypot(*scene.contact_points.T)
+    bound, reaches, distances = np.nan, [np.inf], np.hypot(*scene.contact_points.T)
     if scene.curved:
         radius, heights = scene.mean_radius, scene.asperities.heights
         a = float(hertz.contact_radius(load, scene.material.contact_modulus, radius))
         beyond = 2.0 * radius * (heights.max() - heights.mean())
-        reach = np.sqrt((LEAST_REACH * a) ** 2 + beyond)
-        bound = _bound_within(float(reach), distances, scene, load, influence)
-    if np.isnan(bound):
-        bound = _bound_within(np.inf, distances, scene, load, influence)
+        reach = float(np.sqrt((LEAST_REACH * a) ** 2 + beyond))
+        reaches = [reach, 2.0 * reach, 4.0 * reach, np.inf]
+    for reach in reaches:
+        if np.isnan(bound):
+            bound = _bound_within(reach, distances, scene, load, influence)
     if not np.isfinite(bound):
         raise InputError("load", found=load, expected="a load within the range of float64")
     return bound
@@ -121,8 +122,9 @@ def _bound_within(
 ) -> float:
     """`highest_approach` with weights for asperities at `distances` up to `reach` from the axis.
 
-    It is nan if asperities beyond would have weights, too, or may be displaced by them more than
-    all others. Two asperities are at least as far apart as their distances from the axis differ.
+    It is nan if asperities beyond would have weights, too, or if the weights, as loads, may move
+    one beyond farther than all within. Two asperities are at least as far apart as their distances
+    from the axis differ.
     """
     far, modulus = distances > reach, scene.material.contact_modulus
     near = scene.asperities.layout.sorted(~far)

@@ -17,8 +17,9 @@ from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair
 from convexrough.convex.newton import descend
 from convexrough.influence import Kind
+from convexrough.normal import load_control
 from convexrough.normal.boxes import tried
-from convexrough.normal.load_control import all_that_could_touch, highest_approach
+from convexrough.normal.load_control import all_that_could_touch, approach_bound, highest_approach
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.proved import proved
 from convexrough.normal.refine import refined_loads
@@ -92,6 +93,32 @@ def test_the_bound_in_a_wide_scene(
         approach = cr.press(scene, load=load, influence=kind).certificate.approach
         bound = highest_approach(scene, load, kind)
         assert approach * (1 - 1e-12) <= bound <= approach + 0.1 * (approach + max(heights))
+
+
+def test_no_asperity_that_is_left_out_is_displaced_most(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By the weights of the bound, as loads: else the bound would not hold for it."""
+    seen: list[tuple[Any, Any]] = []
+
+    def seeing(weights: Any, displacement: Any, *rest: Any) -> Any:
+        seen.append((weights, displacement))
+        return approach_bound(weights, displacement, *rest)
+
+    monkeypatch.setattr(load_control, "approach_bound", seeing)
+    narrow = 0
+    for seed in range(200):
+        random = np.random.default_rng(seed)
+        n = int(random.integers(3, 60))
+        points = random.normal(size=(n, 2)) * 10.0 ** random.uniform(-3, 0, size=(n, 1))
+        scene = scenes.on_sphere(points, 0.02, heights=1e-3 * random.random(n))
+        highest_approach(scene, 10.0 ** random.uniform(-12, -3))
+        weights, displacement = seen[-1]
+        far = np.argsort(np.hypot(*points.T))[len(weights) :]
+        near = np.setdiff1d(np.arange(n), far)
+        apart = np.linalg.norm(points[far][:, None] - points[near], axis=2)
+        moved = (weights / apart).sum(axis=1) / (np.pi * scene.material.contact_modulus)
+        assert moved.max(initial=0.0) <= displacement.max(initial=0.0)
+        narrow += len(far) > 0
+    assert narrow > 20
 
 
 @settings(max_examples=8, deadline=None)
