@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
@@ -86,11 +86,11 @@ class Objective(Record):
             if (given := getattr(self, name)) is not None:
                 object.__setattr__(self, name, checks.finite(name, given))
         by = (self.by,) if isinstance(self.by, str) else self.by
-        ordered = isinstance(by, (list, tuple)) and all(isinstance(name, str) for name in by)
-        if not (ordered and 0 < len(by) == len({*by})):
+        ordered = isinstance(by, Iterable) and not isinstance(by, (set, frozenset))
+        by = tuple(by) if ordered else ()
+        if not all(isinstance(name, str) for name in by) or not 0 < len(by) == len({*by}):
             expected = "a list of names of parameters, each once"
             raise InputError("by", found=checks.shown(self.by), expected=expected)
-        by = tuple(by)
         object.__setattr__(self, "by", by)
         if "sphere_radius" in by:
             sphere_radius(self.scene.sphere_radius, "by sphere_radius")

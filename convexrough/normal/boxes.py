@@ -136,8 +136,9 @@ def tried(problem: NormalProblem, loads: Array, displacement: Ball) -> Box | Non
     if not box.convexity_number < 1 and problem.influence.stored:
         if problem.by_load:
             box = widest(problem, loads, highest_by_rates(problem, loads))
-        margin = convex_margin(problem.influence, box.compliance, MARGINS)
-        box = box._replace(convexity_number=1.0 - margin)
+        if not box.convexity_number < 1:
+            margin = convex_margin(problem.influence, box.compliance, MARGINS)
+            box = box._replace(convexity_number=1.0 - margin)
     if box.convexity_number < 1:
         return box
     shells, h = problem.shells, problem.compliance(loads)

@@ -65,6 +65,9 @@ _SCALE = re.compile(
     re.I,
 )
 
+#: Words that, above a map, may mean heights that are no lengths or grow downwards.
+_RAW = re.compile(r"\b((?<!\d )(?:counts|digits)|depths?|down)\b", re.I)
+
 #: A table with at most this many columns is not a matrix if two of them are coordinates of a grid.
 MOST_COLUMNS = 6
 
@@ -206,7 +209,7 @@ def states_scale(comment: str) -> bool:
     if marked and unit and unit.kind == "length":
         return True
     scaled = re.search(r"\d", comment) and _SCALE.search(comment)
-    if scaled or CHANGED.search(comment) or states_factor(comment):
+    if scaled or CHANGED.search(comment) or _RAW.search(comment) or states_factor(comment):
         return True
     return any(not unit or unit.kind == "length" for unit in map(parsed, in_text(comment)))
 
@@ -237,7 +240,8 @@ def _matrix(path: Path, table: TextTable, width: int) -> HeightGrid:
             raise InputError("header", found=found, expected=expected)
         holed = np.where(heights == esri.get("nodata_value"), np.nan, heights)
         return HeightGrid(holed[::-1], (pixel[0], pixel[1]))  # from the top down
-    sizes = [_SIZE.fullmatch(said.get(name, "")) for name in ("width", "height")]
+    length = _LENGTH if table.style.decimal == "," else _SIZE
+    sizes = [length.fullmatch(said.get(name, "")) for name in ("width", "height")]
     value_unit = said.get("value unit", "")
     for name, size in zip(("width", "height"), sizes, strict=True):
         if name in said and size is None:

@@ -101,7 +101,12 @@ def sweep(
     if not isinstance(what, (str, os.PathLike, Mapping)):
         plan = plan_of_scenes(what, measure, approach, load, cycle, shear)
     elif name := next(
-        (name for name, value in given.items() if np.size(value) and value is not None), ""
+        (
+            name
+            for name, it in given.items()
+            if it is not None and (not isinstance(it, (list, tuple)) or it)
+        ),
+        "",
     ):
         raise InputError(name, found="given", expected="none: the sweep tables state it")
     else:

@@ -59,11 +59,7 @@ def totals(cells: Sequence[str]) -> str:
 
 
 #: Words for heights that are no lengths, or that grow downwards.
-CHANGED = re.compile(
-    r"\b((?<!\d )(?:counts|digits)|volts?|mV|waves|fringes|inverted|depths?|down|downwards"
-    r"|multiplied|divided)\b",
-    re.I,
-)
+CHANGED = re.compile(r"\b(volts?|mV|waves|fringes|inverted|downwards|multiplied|divided)\b", re.I)
 
 #: Largest number of characters of a line that are shown; similarity above which the name of an
 #: unread column may be a misspelling; and relative difference up to which factors are equal.
@@ -225,6 +221,7 @@ def states_factor(text: str) -> bool:
     numbers = r"[+-]?[.,]?\d[\d.,]*(?:e[+-]?\d+)?|\b(?:two|ten|hundred|thousand|million)\b"
     found = re.findall(numbers, text, re.I)
     changes = not all(re.fullmatch(r"\+?(1(\.0*)?|0)", number) for number in found)
+    text = re.sub(r"\b(x|y|bias|scan)[\s_-]*offsets?\b", "", text, flags=re.I)  # not of heights
     return changes and bool(FACTORS.search(text) or TIMES.search(text))
 
 

@@ -42,7 +42,7 @@ HOLES = ("", "bad", "nan", "na", "n/a", "#n/a", "#nv", "none", "null", "---", "*
 
 #: The sign # that starts a comment, but not the # in #N/A and other errors of spreadsheets in any
 #: language, such as #NV and #¡VALOR!; nor ####, for a narrow column, if another cell follows.
-_SIGN = r"#(?!(?-i:[¡¿]?[^\W\d_a-zß-ÿ]+[/!?]|NV(?![^\s,;]))|#+ *[,;\t]|##[# ]{0,99}\s[-+.,\d])"
+_SIGN = r"#(?!(?-i:[¡¿]?[^\W\d_a-zß-ÿ]+[/!?]|NV(?![^\s,;]))|#{3,} *[,;\t]|##[# ]{0,99}\s[-+.,\d])"
 
 #: The beginning of a line that is a comment, and of a comment that follows cells on a line.
 COMMENT, _BEHIND = re.compile(f"{_SIGN}|%"), re.compile(rf"(?<![^\s,;]){_SIGN}")

@@ -68,8 +68,8 @@ _POWERS = str.maketrans("⁻¹²³μ−", "-123µ-")
 #: A unit of length or force in a sentence. "um", "m", "metre" and "N" count only after a digit, a
 #: mark, "in" or a word such as "unit", because they can also be words or symbols.
 _IN_TEXT = re.compile(
-    r"(?<![^\W\d])((?i:nm|µm|μm|mm|Å|[aå]ngstr[oö]ms?|microns?|inch(?:es)?|mils?|thou|feet"
-    r"|(?:pico|nano|mi[ck]ro|milli|[cz]enti)met\w+)|cm|[nµμmkM]N|kgf|lbf)(?!\w)"
+    r"(?<![^\W\d])((?i:nm|µm|μm|mm|Å|[aå]ngstr[oö]ms?|microns?|inch(?:es)?|(?-i:mils?|thou|feet)"
+    r"|(?:pico|nano|mi[ck]ro|milli|[cz]enti)m[eè]t(?:ers?|er?n|res?|ri|ros?))|cm|[nµμmkM]N|kgf|lbf)(?!\w)"
     r"|(?:[\d(\[,:=]\s*|\b[Ii]n\s+|\b(?i:units?|einheit(?:en)?|length)\b[\s;:=]*)"
     r"((?i:um|ft|met(?:er|re)[sn]?)|[mN])(?![\w/]|\s*=)"
     r"|(纳米|微米|毫米)"
@@ -89,7 +89,7 @@ AMBIGUOUS = ("in", "bar", "pm")
 def in_text(text: str) -> list[str]:
     """The units of length and force in a sentence, or all units in a text of units alone."""
     cells = re.split(r"\s*[;,\t]\s*", text.strip(" #%"))
-    alone = len(cells) == 1 and not re.fullmatch(r"\S\S+", cells[0])  # a letter, or a sentence
+    alone = len(cells) == 1 and not re.fullmatch(r"[^\W\d_]{2,}", cells[0])  # no word
     if not alone and all(each and parsed(each) for each in cells):
         return cells
     return [next(filter(None, found.groups())) for found in _IN_TEXT.finditer(text)]
