@@ -66,7 +66,7 @@ _SCALE = re.compile(
 )
 
 #: Words that, above a map, may mean heights that are no lengths or grow downwards.
-_RAW = re.compile(r"\b((?<!\d )(?:counts|digits)|depths?|down)\b", re.I)
+_RAW = re.compile(r"\b((?<!\d )(?:counts|digits)|depth|down)\b", re.I)
 
 #: A table with at most this many columns is not a matrix if two of them are coordinates of a grid.
 MOST_COLUMNS = 6

@@ -59,7 +59,9 @@ def totals(cells: Sequence[str]) -> str:
 
 
 #: Words for heights that are no lengths, or that grow downwards.
-CHANGED = re.compile(r"\b(volts?|mV|waves|fringes|inverted|downwards|multiplied|divided)\b", re.I)
+CHANGED = re.compile(
+    r"\b(volts?|mV|waves|fringes|inverted|depths|downwards|multiplied|divided)\b", re.I
+)
 
 #: Largest number of characters of a line that are shown; similarity above which the name of an
 #: unread column may be a misspelling; and relative difference up to which factors are equal.
