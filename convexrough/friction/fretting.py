@@ -91,9 +91,8 @@ def fretting(cycle: Cycle) -> Fretting:
     f, R, levels = checks.friction(scene.friction), scene.relative_radii, walk.levels
     modulus = scene.material.contact_modulus
     unknown = np.nan if walk.general is not None else 0.0  # the memory curve does not hold
-    gaps = -levels.to_scene(
-        levels.depths(walk.stuck[0], levels.candidates)
-    )  # half the range of the slip of asperities that slide
+    # Gaps are half the range of the slip of asperities that slide.
+    gaps = -levels.to_scene(levels.depths(walk.stuck[0], levels.candidates))
     travel = f * float(mindlin.ratio(scene.material.poisson_ratio))
     gross = np.where(cycle.slips > 0, travel * np.maximum(gaps, 0.0), cycle.slips) + unknown
     a = stick_radii(levels, levels.at(walk.least))[0]

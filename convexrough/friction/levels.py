@@ -151,9 +151,9 @@ class FrictionLevels:
         loads = np.zeros(len(problem)) if state is None else state.loads.high
         n, off = problem.beyond(loads, float(level.approach.value))
         if len(n):
-            others, coupling = problem.screened
-            off += float(level.approach.error) + (0.0 if state is None else level.moves(coupling))
-            known.mid.high[others], known.radius[others] = n, off
+            moved = 0.0 if state is None else level.moves(problem.onto_screened)
+            off += float(level.approach.error) + moved
+            known.mid.high[problem.screened], known.radius[problem.screened] = n, off
         return Ball(known.mid, known.radius * (1 + SAFETY))[which]
 
     def to_scene(self, values: NDArray[Any]) -> NDArray[Any]:

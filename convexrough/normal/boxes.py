@@ -33,7 +33,6 @@ from convexrough.influence.coupling import Influence
 from convexrough.influence.shells import fitted_shells
 from convexrough.normal.problem import NormalProblem, convexity_number
 from convexrough.roundoff import ROUNDOFF, SAFETY
-from convexrough.sphere import hertz
 
 Scope = Literal["global", "local", "none"]
 
@@ -163,8 +162,7 @@ def highest_by_rates(problem: NormalProblem, loads: Array) -> float:
 
     It is (2) of docs/theory/certificate.md with the rates q = dP/dL as weights.
     """
-    local = hertz.indentation(loads, problem.coefficients)
-    slopes = np.divide(1.5 * loads, local, out=np.zeros(len(loads)), where=loads > 0)
+    slopes = 1.0 / problem.compliance(loads)  # 0 where open
     parts = problem.influence, problem.shells, np.sqrt(slopes), np.full(len(loads), -1.0)
     try:
         moved = correct(*parts, balanced=False, tolerance=RATES)

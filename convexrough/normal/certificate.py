@@ -305,7 +305,7 @@ class Depths:
             beyond = self.of_screened
         whole = tuple(self.problem.to_scene(each) for each in (self.value, self.error))
         for each, outer in zip(whole, beyond, strict=True):
-            each[self.problem.screened[0]] = outer
+            each[self.problem.screened] = outer
             each *= self.problem.units.length
         return whole
 
@@ -314,7 +314,7 @@ class Depths:
         """(m,) indentations of the asperities `screened`, and their error bounds."""
         n, errors = self.problem.beyond(self.loads, self.approach)
         if len(n):
-            coupling = self.problem.screened[1]
+            coupling = self.problem.onto_screened
             moved = coupling.apply(self.moved)
             errors += self.shift + (moved + coupling.rounding(self.moved).of(moved))
         return n, errors * (1 + SAFETY)
@@ -322,15 +322,14 @@ class Depths:
     def codes(self) -> NDArray[np.int8]:
         """(N,) the codes of statuses that follow from the indentations alone."""
         codes = np.where(self.problem.to_scene(self.value < -self.error), np.int8(OPEN), np.int8(0))
-        left = np.ones(len(codes), dtype=bool)
-        left[self.problem.candidates] = False
+        which = self.problem.screened
         # Asperities with a negative sum of approach and offset are open; others with the sum 0 are
         # if a load displaces them.
-        level = left & (self.problem.scene.offsets == 0) & (self.problem.highest == 0)
-        codes[left & ~level] = OPEN
+        level = (self.problem.scene.offsets[which] == 0) & (self.problem.highest == 0)
+        codes[which[~level]] = OPEN
         if level.any():
             n, errors = self.of_screened
-            codes[self.problem.screened[0][n < -errors]] = OPEN
+            codes[which[n < -errors]] = OPEN
         return codes
 
 
@@ -388,7 +387,7 @@ def _screened_energy(depths: Depths, loads: Array) -> float:
     moved = coupling.apply(s)
     moved += coupling.rounding(s).of(moved)
     local = 0.6 * hertz.indentation(s, coefficients * problem.units.local)
-    indentation, errors = (each[screened[problem.screened[0]]] for each in depths.of_screened)
+    indentation, errors = (each[screened[problem.screened]] for each in depths.of_screened)
     energy = float(s @ (local + (errors - indentation) + 0.5 * np.maximum(moved, 0.0))) * (
         1 + SAFETY
     )

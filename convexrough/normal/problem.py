@@ -124,7 +124,7 @@ class NormalProblem:
         other = replace(self, control=control, by_load=by_load, sharp=True)
         for name in ("exact", "row_norm", "largest_entry"):
             other.__dict__[name] = getattr(self, name)
-        for name in ("squares", "screened"):
+        for name in ("squares", "screened", "onto_screened"):
             if name in self.__dict__:
                 other.__dict__[name] = getattr(self, name)
         return other
@@ -135,25 +135,31 @@ class NormalProblem:
         return frozen(self.scene.asperities.distances[self.candidates] ** 2)
 
     @cached_property
-    def screened(self) -> tuple[Indices, Coupling]:
-        """The indices of the asperities that cannot touch, as approach plus offset is at most 0 in
-        every solution; and the map from loads to their displacements.
+    def screened(self) -> Indices:
+        """(m,) the indices of the asperities that cannot touch, as approach plus offset is at most
+        0 in every solution.
         """
         left = np.ones(len(self.scene), dtype=bool)
         left[self.candidates] = False
-        which = left.nonzero()[0]
-        return which, self.influence.onto(self.scene.contact_points[which])
+        return left.nonzero()[0]
+
+    @cached_property
+    def onto_screened(self) -> Coupling:
+        """The map from loads to displacements of the asperities `screened`."""
+        return self.influence.onto(self.scene.contact_points[self.screened])
 
     def beyond(self, loads: Array, approach: float) -> tuple[Array, Array]:
         """(m,) indentations D0 + d - A P of the asperities `screened`, with bounds on rounding."""
-        (which, coupling), unit = self.screened, self.units.length
+        which, unit = self.screened, self.units.length
         n = approach + self.scene.offsets[which] / unit
         errors = self.scene.offset_errors[which] / unit + 16 * ROUNDOFF * (
             np.abs(n) + abs(approach)
         )
         if len(which) and loads.any():
-            product = coupling.apply(loads)
-            errors += coupling.rounding(loads).of(product) + 16 * ROUNDOFF * np.abs(product)
+            product = self.onto_screened.apply(loads)
+            errors += self.onto_screened.rounding(loads).of(product) + 16 * ROUNDOFF * np.abs(
+                product
+            )
             n -= product
         return n, errors
 

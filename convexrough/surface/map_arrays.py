@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough.arrays import Array, Indices
-from convexrough.errors import ConvexroughError, FileError, InputError
+from convexrough.errors import FileError, InputError
 from convexrough.surface.surface import checked_pixel
-from convexrough.tabular.arrays import named_arrays, parts
+from convexrough.tabular.arrays import foreign, named_arrays, parts
 from convexrough.tabular.roles import shortened
 from convexrough.tabular.units import bare, one_unit, unit
 
@@ -114,22 +114,18 @@ def instrument_map(path: Path) -> HeightGrid:
         raise FileError(f"{path}: found {path.suffix}, expected {expected}") from error
     path.open("rb").close()  # raises the usual error for a missing file
     try:
-        with open_topography(str(path)) as reader:
+        with foreign(), open_topography(str(path)) as reader:
             maps = [channel for channel in reader.height_channels if channel.dim == 2]
             if not maps:
-                expected = "a map of heights; export it as text, for example"
-                raise InputError("file", found="no such map", expected=expected)
+                raise ValueError("it has no map of heights; export one as text, for example")
             names = ", ".join(channel.name for channel in maps)
             part = f"the first of its maps {names}" if len(maps) > 1 else ""
             sized = maps[0].physical_sizes is not None
             sizes = {} if sized else {"physical_sizes": maps[0].nb_grid_pts}
             topography = reader.topography(channel_index=maps[0].index, **sizes)
             heights = np.ma.filled(np.ma.asarray(topography.heights(), dtype=np.float64), np.nan)
-    except (OSError, ConvexroughError):
-        raise
-    except Exception as error:  # damaged files cause errors of many kinds
+    except ValueError as error:
         reason = str(error).partition("\n")[0]
-        reason = reason if " " in reason else repr(error)
         if reason.startswith("tried"):  # a list with an error for each of its formats
             reason = "it is in none of its formats; export the map as text, for example"
         raise FileError(f"{path}: SurfaceTopography cannot read it: {reason}") from error

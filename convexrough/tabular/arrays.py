@@ -55,7 +55,8 @@ def foreign() -> Iterator[None]:
     except OSError:
         raise
     except Exception as error:
-        raise ValueError(str(error) or type(error).__name__) from error
+        reason = str(error)
+        raise ValueError(reason if " " in reason else repr(error)) from error
 
 
 def named_arrays(path: Path) -> dict[str, Any]:
