@@ -5,13 +5,15 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Executor, ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from functools import cache
 from typing import Any, TypeVar
 
 Part = TypeVar("Part")
 
 #: Up to this many numbers, the work takes less time than starting threads.
-MANY = 2**18
+MANY = 2**17
 
 
 def cores() -> int:
@@ -28,24 +30,25 @@ def worthwhile(numbers: int) -> int:
 
 def each(work: Callable[[Part], object], parts: Iterable[Part], threads: int) -> None:
     """Call work(part) for each part, in any order, also in this thread; raise one of its errors.
-    No call may write what another call reads. At the end no other thread runs: fork is safe."""
-    todo, errors = iter(list(parts)), list[BaseException]()  # `next` of a list's iterator is atomic
+    No call may write what another call reads."""
+    todo = iter(list(parts))  # `next` of a list's iterator is atomic
 
     def some() -> None:
-        try:
-            for part in todo:
-                work(part)
-        except BaseException as error:
-            errors.append(error)
+        for part in todo:
+            work(part)
 
-    others = [threading.Thread(target=some) for _ in range(threads - 1)]
-    for other in others:
-        other.start()
-    some()
-    for other in others:
-        other.join()
-    if errors:
-        raise errors[0]
+    if threads == 1:
+        some()
+        return
+    with one_thread():
+        others = [_inside[0][1].submit(some) for _ in range(threads - 1)]
+        try:
+            some()
+        finally:
+            started = [other for other in others if not other.cancel()]
+            wait(started)
+        for other in started:
+            other.result()  # raises its error
 
 
 def chunks(length: int, size: int) -> Iterator[slice]:
@@ -55,32 +58,39 @@ def chunks(length: int, size: int) -> Iterator[slice]:
 
 
 _lock = threading.Lock()
-_inside: list[Any] = []
+_inside: list[tuple[Any, Executor]] = []  # limits of threads and a pool, once for each `one_thread`
 
 
 @contextmanager
 def one_thread() -> Iterator[None]:
     """A context manager: linear algebra in the body uses one thread, until the last thread leaves
-    it. Several threads would round sums differently and slow down those of `each`."""
+    it. Several threads would round sums differently and slow down those of `each`, which are kept
+    as long. At the end none of them runs: fork is safe."""
     with _lock:
         if not _inside:
-            import scipy.linalg  # noqa: F401  limits apply only to loaded libraries
-            from threadpoolctl import threadpool_limits
-
             _free()
-            limits = threadpool_limits(1)
+            _inside.append((_libraries().limit(limits=1), ThreadPoolExecutor(max(1, cores() - 1))))
         else:
-            limits = _inside[0]
-        _inside.append(limits)
+            _inside.append(_inside[0])
     try:
         yield
     finally:
         with _lock:
-            if len(_inside) == 1:
+            limits, pool = _inside.pop()
+            if not _inside:
+                pool.shutdown()
                 _free()
                 limits.restore_original_limits()
                 _free()
-            _inside.pop()
+
+
+@cache
+def _libraries() -> Any:
+    """The libraries of linear algebra, which take a millisecond to find."""
+    import scipy.linalg  # noqa: F401  limits apply only to loaded libraries
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
 
 
 def _free() -> None:

@@ -27,7 +27,7 @@ from convexrough.influence import coupling
 from convexrough.influence.convolution import Kernel, SiteBox, through_waves
 from convexrough.influence.lattice_symbol import least_symbol
 from convexrough.influence.sliced import LARGE, MANY, PULLED, SLICES, Distances, Pulls, Sliced
-from convexrough.influence.smoother import block_smoother
+from convexrough.influence.smoother import Blocks
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.lattice import Lattice
 from convexrough.scene.layout import Layout
@@ -171,9 +171,7 @@ class LatticeInfluence(coupling.Influence):
 
     @cached_property
     def _single(self) -> NDArray[Any]:
-        if "_kernel" in vars(self):
-            return self._kernel.spectrum.astype(np.float32)
-        return self.box.kernel(1, np.float32).spectrum
+        return self._kernel.spectrum.astype(np.float32)
 
     def __len__(self) -> int:
         return len(self.members)
@@ -376,7 +374,11 @@ class LatticeInfluence(coupling.Influence):
         return Ball.around(change * unit, 1.01 * error * unit)
 
     def smoother(self, root: Array) -> coupling.Smoother:
-        return block_smoother(np.stack(self.cells), self.box.basis, self._unit, root)
+        blocks: Blocks | None = self._kept.get("blocks")
+        if blocks is None:
+            cells = np.stack(self.cells)
+            blocks = self._keep("blocks", Blocks.of(cells, self.box.basis, self._unit))
+        return blocks.smoother(root)
 
 
 def _largest_sum(values: Array, apart: int) -> float:

@@ -20,7 +20,7 @@ from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.pair_sums import Product
 from convexrough.influence.sharp_sums import MeshSums
 from convexrough.influence.sliced_matrix import MatrixSums
-from convexrough.influence.smoother import smoother_of_points
+from convexrough.influence.smoother import Blocks, blocks_of_points
 from convexrough.influence.splitting import Splitting
 
 #: Target of the relative error that interpolation causes in a product. It is the largest part of
@@ -127,7 +127,11 @@ class ScatteredInfluence(coupling.Influence):
         return MatrixSums(*coupling.known(self.points, self.tails, self.point_error))
 
     def smoother(self, root: Array) -> coupling.Smoother:
-        return smoother_of_points(self.points, self.scale, root)
+        return self._blocks.smoother(root)
+
+    @cached_property
+    def _blocks(self) -> Blocks:
+        return blocks_of_points(self.points, self.scale)
 
     @property
     def _double(self) -> Product | None:

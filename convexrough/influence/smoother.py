@@ -10,6 +10,8 @@ conjugate gradients, not the answer.
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -39,8 +41,8 @@ MOST_SHARING, MOST_CELLS, WIDEST_GAP = 4.0, 32, 8
 LEAST = 0.2
 
 
-def smoother_of_points(points: Array, scale: float, root: Array) -> Smoother:
-    """M for asperities at arbitrary points, on square cells with about one asperity on average.
+def blocks_of_points(points: Array, scale: float) -> Blocks:
+    """Blocks of square cells with about one asperity on average, for arbitrary points (n, 2).
 
     If points are in clusters, cells are smaller, and wide empty strips are left out.
     """
@@ -53,7 +55,7 @@ def smoother_of_points(points: Array, scale: float, root: Array) -> Smoother:
         if np.prod(finer.max(axis=1) + 1) > MOST_CELLS * n:
             break
         side, cells = 0.5 * side, finer
-    return block_smoother(cells, np.eye(2), scale / side, root)
+    return Blocks.of(cells, np.eye(2), scale / side)
 
 
 def _packed_cells(places: Array) -> Indices:
@@ -71,72 +73,94 @@ def _mean_sharing(cells: Indices) -> float:
     return float(counts @ counts / cells.shape[1])
 
 
-def block_smoother(cells: Indices, basis: Array, scale: float, root: Array) -> Smoother:
-    """M for asperities in these cells (2, n) of a lattice, with the diagonal `root` (n,) of W.
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """Blocks of BLOCK x BLOCK cells with asperities, and what M needs of them for any W."""
 
-    basis : reduced, with a shorter vector of length 1
-    scale : the product A_ij r_ij, with the distances r_ij in the unit of `basis`
-    """
-    from scipy.fft import next_fast_len
+    block: Indices  # (n,) index of the block of each asperity in a `field`
+    shape: tuple[int, int]  # numbers of rows and columns of blocks
+    size: tuple[int, int]  # size of the transforms
+    scale: float  # the product A_ij r_ij, with the distances r_ij in cells
+    passed: Single  # factors by which G^2 multiplies waves
+    spectrum: Single  # transform of the mean of 1 / r over pairs of different blocks
+    own: float  # mean of 1 / r over two different asperities of one block
 
-    i, j = cells // BLOCK
-    rows, columns = int(i.max()) + 1, int(j.max()) + 1
-    workers = threads.worthwhile(4 * rows * columns)
-    size = next_fast_len(rows, real=True), next_fast_len(columns, real=True)
-    stride = 2 * (size[1] // 2 + 1)  # as in a `SiteBox.field`
-    block = i * stride + j
+    @classmethod
+    def of(cls, cells: Indices, basis: Array, scale: float) -> Blocks:
+        """For asperities in these cells (2, n) of a lattice.
 
-    def sums(values: NDArray[Any]) -> Single:
+        basis : reduced, with a shorter vector of length 1
+        scale : the product A_ij r_ij, with the distances r_ij in the unit of `basis`
+        """
+        from scipy.fft import next_fast_len
+
+        i, j = cells // BLOCK
+        rows, columns = int(i.max()) + 1, int(j.max()) + 1
+        size = next_fast_len(rows, real=True), next_fast_len(columns, real=True)
+        block = i * _stride(size) + j
+        spectrum, own = _block_spectrum(size, basis)
+        return cls(block, (rows, columns), size, scale, _low_pass(size, basis), spectrum, own)
+
+    def _sums(self, values: NDArray[Any]) -> Single:
         """The field of the sums of values (n,) over each block."""
-        return np.bincount(block, values, rows * stride).astype(np.float32).reshape(rows, stride)
+        rows, stride = self.shape[0], _stride(self.size)
+        sums = np.bincount(self.block, values, rows * stride)
+        return sums.astype(np.float32).reshape(rows, stride)
 
-    total = sums(root * root)  # W^2 summed over each block
-    touching = total > 0
-    counts = sums(root > 0)[touching].astype(np.float64)
-    sharing = float(counts @ counts / counts.sum())
-    # Estimates A W r within a block of many asperities, for r with random signs.
-    rough = scale / BLOCK * np.sqrt(np.pi * sharing * np.log(max(0.5 * sharing / BLOCK**2, 1.0)))
-    spectrum = _block_spectrum(size, basis, float(counts.mean()), workers)
-    passed = _low_pass(size, basis)
+    def smoother(self, root: Array) -> Smoother:
+        """M for the diagonal `root` (n,) of W."""
+        size, workers = self.size, threads.worthwhile(4 * math.prod(self.shape))
+        passed, block = self.passed, self.block
+        total = self._sums(root * root)  # W^2 summed over each block
+        touching = total > 0
+        counts = self._sums(root > 0)[touching].astype(np.float64)
+        sharing = float(counts @ counts / counts.sum())
+        # Estimates A W r within a block of many asperities, for r with random signs.
+        within = np.sqrt(np.pi * sharing * np.log(max(0.5 * sharing / BLOCK**2, 1.0)))
+        rough = self.scale / BLOCK * within
 
-    def average(waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
-        waves[0] *= passed[:, each]
-        return waves
-
-    mean = through_waves([total], size, workers, average)[0]
-    least = np.float32(1e-3) * mean[:, :columns].max()
-    mean = np.maximum(mean, least)  # d; rounding may make it negative
-    w = root.astype(np.float32)
-    touched = (w > 0).astype(np.float32)
-    q = w / np.sqrt(mean.ravel()[block])
-
-    middle = np.float32(np.sqrt(np.median(mean[touching])))
-    displacement = np.float32(scale) * middle * spectrum  # b^(1/2) A, for each wave
-    removed = 1.0 - 1.0 / np.maximum(1.0 + middle * displacement, np.float32(LEAST))
-    removed *= passed
-    energies = displacement * displacement
-    energies[:, 1 : (size[1] + 1) // 2] *= 2  # each wave stands for its conjugate, too
-    energies *= np.float32(BLOCK**2 / (size[0] * size[1]))
-
-    def smooth(values: NDArray[Any]) -> tuple[NDArray[Any], float]:
-        left = np.zeros(removed.shape[1])
-
-        def remove(waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
-            power = np.square(waves[0].real)
-            power += np.square(waves[0].imag)
-            left[each] = np.einsum("ij,ij->j", power, energies[:, each])
-            waves[0] *= removed[:, each]
+        def average(waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
+            waves[0] *= passed[:, each]
             return waves
 
-        field = through_waves([sums(q * values)], size, workers, remove)[0]
-        averages = field.ravel()[block]
-        averages *= q
-        np.subtract(values, averages, out=averages)
-        averages *= touched
-        waves, inner = np.sqrt(left.sum()), rough * np.linalg.norm(w * values) if rough else 0.0
-        return averages, float(np.hypot(waves, inner))
+        mean = through_waves([total], size, workers, average)[0]
+        least = np.float32(1e-3) * mean[:, : self.shape[1]].max()
+        mean = np.maximum(mean, least)  # d; rounding may make it negative
+        w = root.astype(np.float32)
+        q = w / np.sqrt(mean.take(block))
 
-    return smooth
+        middle = np.float32(np.sqrt(np.median(mean[touching])))
+        own = self.own * max(0.0, 1.0 - 1.0 / float(counts.mean()))
+        # b^(1/2) A, for each wave:
+        displacement = np.float32(self.scale) * middle * (self.spectrum + np.float32(own))
+        removed = 1.0 - 1.0 / np.maximum(1.0 + middle * displacement, np.float32(LEAST))
+        removed *= passed
+        energies = displacement * displacement
+        energies[:, 1 : (size[1] + 1) // 2] *= 2  # each wave stands for its conjugate, too
+        energies *= np.float32(BLOCK**2 / math.prod(size))
+
+        def smooth(values: NDArray[Any]) -> tuple[NDArray[Any], float]:
+            left = np.zeros(removed.shape[1])
+
+            def remove(waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
+                power = np.square(waves[0].real)
+                power += np.square(waves[0].imag)
+                left[each] = np.einsum("ij,ij->j", power, energies[:, each])
+                waves[0] *= removed[:, each]
+                return waves
+
+            field = through_waves([self._sums(q * values)], size, workers, remove)[0]
+            averages = field.take(block)
+            averages *= q
+            np.subtract(values, averages, out=averages)
+            inner = rough * np.linalg.norm(w * values) if rough else 0.0
+            return averages, float(np.hypot(np.sqrt(left.sum()), inner))
+
+        return smooth
+
+
+def _stride(size: tuple[int, int]) -> int:
+    return 2 * (size[1] // 2 + 1)  # as in a `SiteBox.field`
 
 
 def _low_pass(size: tuple[int, int], basis: Array) -> Single:
@@ -148,8 +172,9 @@ def _low_pass(size: tuple[int, int], basis: Array) -> Single:
     return passed.astype(np.float32)
 
 
-def _block_spectrum(size: tuple[int, int], basis: Array, count: float, workers: int) -> Single:
-    """The spectrum of the mean of 1 / r over pairs of blocks, about, for `count` points in each."""
+def _block_spectrum(size: tuple[int, int], basis: Array) -> tuple[Single, float]:
+    """The spectrum of the mean of 1 / r over pairs of different blocks, about; and this mean over
+    pairs of cells in one block."""
     from scipy import fft
 
     i, j = (BLOCK * np.fft.ifftshift(np.arange(n) - n // 2) for n in size)
@@ -158,7 +183,6 @@ def _block_spectrum(size: tuple[int, int], basis: Array, count: float, workers: 
     mean = (1.0 / np.hypot(x, y)).astype(np.float32)
     a, b = basis
     sides, diagonals = np.hypot(*basis.T), np.hypot(*np.transpose([a + b, a - b]))
-    own = ((2.0 / sides).sum() + (1.0 / diagonals).sum()) / 6.0  # six pairs of cells in a block
-    mean[0, 0] = own * max(0.0, 1.0 - 1.0 / count)
-    spectrum: Any = fft.rfft2(mean, workers=workers).real
-    return np.ascontiguousarray(spectrum)
+    spectrum: Any = fft.rfft2(mean).real
+    own = ((2.0 / sides).sum() + (1.0 / diagonals).sum()) / 6.0  # six pairs of cells
+    return np.ascontiguousarray(spectrum), float(own)

@@ -173,7 +173,7 @@ class Scene(Record):
         """
         squares, drops = self.asperities.positions**2, np.zeros(len(self))
         for R, axes in self.curved:
-            drops += squares[:, axes].sum(axis=1) / (2.0 * self.far_radii(R))
+            drops += squares[:, axes] @ np.ones(2)[axes] / (2.0 * self.far_radii(R))
         return frozen(drops)
 
     @property
