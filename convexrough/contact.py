@@ -280,7 +280,8 @@ def press(
     began = time.perf_counter()
     checks.instance("scene", scene, Scene)
     solver = solvers.named(solver)
-    return _contact(assembled(solver, scene, approach, load, influence), solver, start, began)
+    with threads.one_where(4 * len(scene)):
+        return _contact(assembled(solver, scene, approach, load, influence), solver, start, began)
 
 
 def solve(

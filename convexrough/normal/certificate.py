@@ -415,13 +415,12 @@ def _other_solutions(level: Level, box: Box) -> tuple[bool, float, bool]:
         t = 2.0 / np.pi * _mean(a, radii(problem.bounds(highest)))
         return A.crowding(t) * perturbed <= 1 or A.semidefinite_with(float(t.max(initial=0.0)))
 
-    # `overhang` needs weights and the displacement that exactly these weights cause.
-    if excluded(problem.overhang(loads, level.trial.product)):
-        return none
-    # The bound by rates costs more, and is not below the approach.
-    useful = problem.by_load and excluded(float(level.approach.lower))
-    if useful and excluded(highest_by_rates(problem, loads)):
-        return none
+    # No bound is below the approach. `overhang` needs weights and exactly their displacement.
+    if not problem.by_load or excluded(float(level.approach.lower)):
+        if excluded(problem.overhang(loads, level.trial.product)):
+            return none
+        if problem.by_load and excluded(highest_by_rates(problem, loads)):
+            return none
     crowding = 0.75 * np.pi * (1.0 - SAFETY) - A.crowding(a) * perturbed
     return True, max(crowding, 0.0), bool((a <= ROOMY * A.separations()).all())
 

@@ -70,7 +70,8 @@ def approach_bound(
     """
     total = summed(weights)
     q, c = weights / total, displacement / total
-    cubes = (q * coefficients) ** 3
+    alpha = q * coefficients
+    cubes = alpha * alpha * alpha
     highest, wanted = largest(c), 27.0 * load / 8.0
     if q.ndim == 1:
         active, cubes = c[cubes > 0], cubes[cubes > 0]  # only these matter
@@ -181,7 +182,7 @@ def lowered(scene: Scene, load: float, which: Indices) -> Array:
     offsets = scene.offsets[which]
     if scene.curved:
         a = float(hertz.contact_radius(load, scene.material.contact_modulus, scene.mean_radius))
-        distances = np.hypot(*scene.asperities.positions[which].T)
+        distances = np.hypot(*scene.asperities.positions.take(which, axis=0).T)
         offsets = offsets - hertz.surface_displacement(distances, a, scene.mean_radius)
     return offsets
 

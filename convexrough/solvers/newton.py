@@ -42,9 +42,9 @@ ACCURATE = 1e-12
 #: residuals are far above them. Affects speed only.
 NOISY = 1e-6
 
-#: Asperities are near the contact if their gap is at most this part of the largest D_i. Affects
-#: speed only.
-MARGIN = 0.03
+#: Asperities are near the contact if their gap at the start is at most MARGIN times the largest D_i
+#: plus ROUGH times the standard deviation of differences of successive heights. Affects speed only.
+MARGIN, ROUGH = 0.005, 0.35
 
 
 @dataclass(frozen=True)
@@ -154,7 +154,9 @@ class Newton:
         refines = problem.influence.cheap_sums and not self.tolerance > 0
         if len(problem) > ALL_ITERATED and start is None:
             highest = float(np.maximum(problem.approach_bound + problem.offsets, 0.0).max())
-            near = np.flatnonzero(indentation > -MARGIN * highest)
+            heights = problem.scene.asperities.heights[problem.candidates]
+            margin = MARGIN * highest + ROUGH * float(np.diff(heights).std()) / problem.units.length
+            near = np.flatnonzero(indentation > -margin)
         while True:
             begin = indentation[near]
             del indentation  # saves memory
@@ -175,7 +177,7 @@ class Newton:
             indentation = -gap
             indentation[near] = unknown
             touched[near] = True  # `near` only grows, so the loop ends
-            near = np.flatnonzero(touched | (indentation > -MARGIN * highest))
+            near = np.flatnonzero(touched | (indentation > -margin))
 
     def _iterate(
         self, problem: NormalProblem, near: Indices, indentation: Array, early: bool

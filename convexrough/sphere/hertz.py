@@ -64,10 +64,12 @@ def surface_displacement(distance: Number, contact_radius: Number, radius: Numbe
     a sqrt(r^2 - a^2)], which equals r^2 (sin 2s / 2 - s cos 2s) / (pi R) with s = asin(a/r).
     """
     a, r = contact_radius, np.asarray(distance, dtype=np.float64)
-    outer = np.maximum(r, a)
+    displacement, outside = np.asarray(a**2 / radius - r**2 / (2 * radius)), r > a
+    outer = r[outside]
     s = np.arcsin(a / outer)
-    outside = outer**2 * (2.0 * s * np.sin(s) ** 2 - less_sine(2.0 * s) / 2.0)  # no cancellation
-    return np.where(r < a, a**2 / radius - r**2 / (2 * radius), outside / (np.pi * radius))
+    twice = 2.0 * s * np.sin(s) ** 2 - less_sine(2.0 * s) / 2.0  # no cancellation
+    displacement[outside] = outer**2 * twice / (np.pi * radius)
+    return displacement
 
 
 def less_sine(angle: Number) -> Number:
@@ -76,4 +78,4 @@ def less_sine(angle: Number) -> Number:
     series = LESS_SINE[0]
     for coefficient in LESS_SINE[1:]:
         series = coefficient - small * series
-    return np.where(angle < 1.0, series * angle**3, angle - np.sin(angle))
+    return np.where(angle < 1.0, series * (angle * angle * angle), angle - np.sin(angle))
