@@ -34,7 +34,7 @@ STATUSES = np.array(["undecided", "contact", "open"])
 TOUCHING, OPEN = 1, 2
 
 #: For at most this many asperities that can touch, a contact keeps the operator for friction, and a
-#: certificate for the gaps of the other asperities.
+#: certificate for the gaps.
 MOST_KEPT = {"dense": ALL_SHARP, "lattice": 2**19, "scattered": 2**16}
 
 #: If no contact radius of a solution exceeds this fraction of the distance to the nearest
@@ -294,10 +294,9 @@ class Depths:
     error: Array  # error bounds of these; infinite if nothing is proved
 
     def kept(self) -> Callable[[], tuple[Array, ...]]:
-        """These depths or, if all can touch or the operator is large, a function that has them."""
-        n = len(self.problem)
-        later = n < len(self.problem.scene) and n <= MOST_KEPT[self.problem.influence.name]
-        return self if later else partial(tuple, self())
+        """These depths or, if the operator is large, a function that has them."""
+        few = len(self.problem) <= MOST_KEPT[self.problem.influence.name]
+        return self if few else partial(tuple, self())
 
     def __call__(self) -> tuple[Array, ...]:
         """(N,) [length] indentations of all asperities of the scene, and their error bounds."""

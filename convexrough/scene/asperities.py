@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,9 @@ from convexrough.scene.layout import HEXAGONAL, SQUARE, Layout
 #: Random heights and logarithms of radii are normally distributed. They are clipped at this many
 #: standard deviations, so that only finitely many asperities of an unbounded array can touch.
 CUT_DEVIATIONS = 6.0
+
+#: The last lattices of at most about this many points are kept.
+FEW = 300
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -192,10 +195,17 @@ class Asperities(Record):
         ratio = within / spacing
         count = np.pi / second[1] * ratio**2 + 1
         checks.fits_in_memory(f"within / spacing = {ratio:.3g}", count, 300)
-        layout = Layout.of(second, spacing, ratio**2 * (1 + 1e-12))
+        make = _kept_layout if count <= FEW else Layout.of
+        layout = make(second, spacing, ratio**2 * (1 + 1e-12))
         n = len(layout.points)
         radii = checks.array("tip_radius", tip_radius, length=n, sign="positive")
         return cls._on(layout, radii, 0.0)
+
+
+@lru_cache(maxsize=8)
+def _kept_layout(second: tuple[float, float], spacing: float, limit: float) -> Layout:
+    """`Layout.of`; scenes that are made anew on the last layouts use what these store."""
+    return Layout.of(second, spacing, limit)
 
 
 def largest_tip_radius(tip_radius: ArrayLike, tip_radius_cv: float) -> float:

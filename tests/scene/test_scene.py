@@ -62,6 +62,18 @@ def test_hexagonal_lattice() -> None:
     assert (np.diff(squares) >= 0).all()
 
 
+def test_a_small_pattern_made_again_shares_what_depends_on_positions_only() -> None:
+    pattern: dict[str, Any] = dict(spacing=0.0025, within=0.01)
+    one = cr.Asperities.hexagonal(**pattern, tip_radius=0.02)
+    rough = cr.Asperities.hexagonal(**pattern, tip_radius=0.03, height_std=1e-6, seed=3)
+    assert rough.layout is one.layout
+    assert (rough.tip_radii == 0.03).all()
+    assert rough.heights.any()
+    assert not one.heights.any()
+    wider = cr.Asperities.hexagonal(spacing=0.0025, within=0.0101, tip_radius=0.02)
+    assert wider.layout is not one.layout
+
+
 def test_random_heights_and_radii() -> None:
     options: dict[str, Any] = dict(spacing=1.0, tip_radius=2.0, within=60.0, seed=11)
     both = cr.Asperities.square(height_std=0.1, tip_radius_cv=0.3, **options)
