@@ -343,7 +343,7 @@ def _contact(
     if start is not None:
         given = checks.array("start", start, length=len(scene), sign="not negative")
         first = given[problem.candidates] / force
-    with threads.one_where(4 * len(problem)):
+    with threads.one_where((4 if problem.influence.stored else 100) * len(problem)):
         if len(problem) == 0:  # no asperity can touch at so small an approach
             solution = Solution(np.zeros(0), float(problem.approach or 0.0), 0, 0.0)
         else:

@@ -11,6 +11,8 @@ from functools import cache
 from typing import Any, TypeVar
 
 Part = TypeVar("Part")
+One = TypeVar("One")
+Other = TypeVar("Other")
 
 #: Up to this many numbers, the work takes less time than starting threads.
 MANY = 2**17
@@ -40,8 +42,8 @@ def each(work: Callable[[Part], object], parts: Iterable[Part], threads: int) ->
     if threads == 1:
         some()
         return
-    with one_thread():
-        others = [_inside[0][1].submit(some) for _ in range(threads - 1)]
+    with one_thread() as pool:
+        others = [pool.submit(some) for _ in range(threads - 1)]
         try:
             some()
         finally:
@@ -49,6 +51,14 @@ def each(work: Callable[[Part], object], parts: Iterable[Part], threads: int) ->
             wait(started)
         for other in started:
             other.result()  # raises its error
+
+
+def both(first: Callable[[], One], second: Callable[[], Other]) -> tuple[One, Other]:
+    """The results of first() and second(), which run at the same time."""
+    with one_thread() as pool:
+        other = pool.submit(second)
+        found = first()
+        return found, second() if other.cancel() else other.result()
 
 
 def chunks(length: int, size: int) -> Iterator[slice]:
@@ -62,18 +72,19 @@ _inside: list[tuple[Any, Executor]] = []  # limits of threads and a pool, once f
 
 
 @contextmanager
-def one_thread() -> Iterator[None]:
+def one_thread() -> Iterator[Executor]:
     """A context manager: linear algebra in the body uses one thread, until the last thread leaves
     it. Several threads would round sums differently and slow down those of `each`, which are kept
-    as long. At the end none of them runs: fork is safe."""
+    as long, in the pool that it yields. At the end none of them runs: fork is safe."""
     with _lock:
         if not _inside:
             _free()
             _inside.append((_libraries().limit(limits=1), ThreadPoolExecutor(max(1, cores() - 1))))
         else:
             _inside.append(_inside[0])
+        pool = _inside[0][1]
     try:
-        yield
+        yield pool
     finally:
         with _lock:
             limits, pool = _inside.pop()

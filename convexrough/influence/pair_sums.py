@@ -9,9 +9,8 @@ matrix. docs/theory/operators-mesh.md derives the method and the error bounds.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 from typing import Any
 
@@ -226,11 +225,13 @@ class Product:
     def apply(self, loads: NDArray[Any]) -> NDArray[Any]:
         """(n,) the sums. A second thread computes the product with S at the same time."""
         ordered = loads[self.mesh.places]
-        with ThreadPoolExecutor(1) as other:
-            near = other.submit(self.near.apply, ordered)
+
+        def far() -> NDArray[Any]:
             field = self.mesh.to_nodes(ordered)
-            total = self.mesh.from_nodes(self.mesh.box.convolve(field, self.kernel.spectrum))
-            total += near.result()
+            return self.mesh.from_nodes(self.mesh.box.convolve(field, self.kernel.spectrum))
+
+        total, near = threads.both(far, partial(self.near.apply, ordered))
+        total += near
         return self.mesh.back(total)
 
     def interpolation(self, strengths: Array) -> Array:
