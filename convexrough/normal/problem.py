@@ -218,7 +218,7 @@ class NormalProblem:
         enough : fraction of the defect that the step may leave;  todo : used only by `Stack`
         """
         some, influence = np.arange(len(self)), self.influence
-        if influence.cheap_sums:  # save the time for asperities that do not move
+        if not influence.stored:  # save the time for asperities that do not move
             some = ((slopes > 0) | (defect != 0)).nonzero()[0]
             influence = influence.restricted(some)
         parts = influence, taken(self.shells, some), np.sqrt(slopes[some]), defect[some]
