@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Executor, ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from functools import cache
 from typing import Any, TypeVar
@@ -39,26 +39,31 @@ def each(work: Callable[[Part], object], parts: Iterable[Part], threads: int) ->
         for part in todo:
             work(part)
 
-    if threads == 1:
+    others = [_pool().submit(some) for _ in range(threads - 1)]
+    try:
         some()
-        return
-    with one_thread() as pool:
-        others = [pool.submit(some) for _ in range(threads - 1)]
-        try:
-            some()
-        finally:
-            started = [other for other in others if not other.cancel()]
-            wait(started)
-        for other in started:
-            other.result()  # raises its error
+    finally:
+        started = [other for other in others if not other.cancel()]
+        wait(started)
+    for other in started:
+        other.result()  # raises its error
 
 
 def both(first: Callable[[], One], second: Callable[[], Other]) -> tuple[One, Other]:
     """The results of first() and second(), which run at the same time."""
-    with one_thread() as pool:
-        other = pool.submit(second)
-        found = first()
-        return found, second() if other.cancel() else other.result()
+    other = _pool().submit(second)
+    found = first()
+    return found, second() if other.cancel() else other.result()
+
+
+@cache
+def _pool() -> ThreadPoolExecutor:
+    """The threads besides the caller's, which wait for work until the process ends."""
+    return ThreadPoolExecutor(max(1, cores() - 1))
+
+
+if hasattr(os, "register_at_fork"):  # not on Windows
+    os.register_at_fork(after_in_child=_pool.cache_clear)  # a child has none of these threads
 
 
 def chunks(length: int, size: int) -> Iterator[slice]:
@@ -68,28 +73,23 @@ def chunks(length: int, size: int) -> Iterator[slice]:
 
 
 _lock = threading.Lock()
-_inside: list[tuple[Any, Executor]] = []  # limits of threads and a pool, once for each `one_thread`
+_inside: list[Any] = []
 
 
 @contextmanager
-def one_thread() -> Iterator[Executor]:
+def one_thread() -> Iterator[None]:
     """A context manager: linear algebra in the body uses one thread, until the last thread leaves
-    it. Several threads would round sums differently and slow down those of `each`, which are kept
-    as long, in the pool that it yields. At the end none of them runs: fork is safe."""
+    it. Several threads would round sums differently and slow down those of `each`."""
     with _lock:
         if not _inside:
             _free()
-            _inside.append((_libraries().limit(limits=1), ThreadPoolExecutor(max(1, cores() - 1))))
-        else:
-            _inside.append(_inside[0])
-        pool = _inside[0][1]
+        _inside.append(_inside[0] if _inside else _libraries().limit(limits=1))
     try:
-        yield pool
+        yield
     finally:
         with _lock:
-            limits, pool = _inside.pop()
+            limits = _inside.pop()
             if not _inside:
-                pool.shutdown()
                 _free()
                 limits.restore_original_limits()
                 _free()

@@ -1,5 +1,6 @@
-"""Work in several threads: all of it is done, errors are raised, and no thread is left."""
+"""Work in several threads: all of it is done, errors are raised, and a forked process can work."""
 
+import multiprocessing
 import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
@@ -10,6 +11,12 @@ from threadpoolctl import threadpool_info
 from convexrough import threads
 
 
+def squares(_: int = 0) -> list[int]:
+    done: list[int] = []
+    threads.each(lambda k: done.append(k * k), range(3), 3)
+    return sorted(done)
+
+
 def limits_of_threads() -> set[int]:
     import scipy.linalg  # noqa: F401  has linear algebra of its own
 
@@ -17,19 +24,17 @@ def limits_of_threads() -> set[int]:
 
 
 def test_callers_in_several_threads_do_not_disturb_each_other() -> None:
-    before, limits = threading.active_count(), limits_of_threads()
+    limits = limits_of_threads()
 
-    def squares(_: int) -> list[int]:
-        done: list[int] = []
-        threads.each(lambda k: done.append(k * k), range(3), 3)
-        return sorted(done)
+    def limited(k: int) -> tuple[list[int], set[int]]:
+        with threads.one_thread():
+            return squares(), limits_of_threads() if k % 100 == 0 else {1}
 
     sys.setswitchinterval(1e-6)  # threads take turns at nearly every line
     with ThreadPoolExecutor(2) as pool:
-        found = list(pool.map(squares, range(1000)))
+        found = list(pool.map(limited, range(1000)))
     sys.setswitchinterval(0.005)
-    assert found == 1000 * [[0, 1, 4]]
-    assert threading.active_count() == before
+    assert found == 1000 * [([0, 1, 4], {1})]
     assert limits_of_threads() == limits
 
 
@@ -44,6 +49,25 @@ def test_an_error_of_any_thread_is_raised_when_no_thread_works_any_more(fails: i
             raise ZeroDivisionError
         ended.append(k)
 
-    with threads.one_thread(), pytest.raises(ZeroDivisionError):
+    with pytest.raises(ZeroDivisionError):
         threads.each(work, [0, 9, 1, 2, 3], 2)
     assert len(ended) == 4
+
+
+def met() -> list[int]:
+    """[0, 1] if two threads run at once."""
+    meeting = threading.Barrier(2, timeout=10)
+    return sorted(threads.both(meeting.wait, meeting.wait))
+
+
+def test_both_run_at_once_even_in_a_thread_of_the_pool() -> None:
+    assert met() == [0, 1]
+    assert threads.both(lambda: 1, lambda: threads.both(lambda: 2, lambda: 3)) == (1, (2, 3))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="forks")
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of forks of a process with threads
+def test_a_forked_process_makes_threads_of_its_own() -> None:
+    assert met() == [0, 1]
+    with multiprocessing.get_context("fork").Pool(1) as child:
+        assert child.apply_async(met).get(timeout=20) == [0, 1]
