@@ -1,9 +1,11 @@
 """Work in several threads: all of it is done, errors are raised, and a forked process can work."""
 
 import multiprocessing
+import subprocess
 import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import pytest
 from threadpoolctl import threadpool_info
@@ -65,9 +67,14 @@ def test_both_run_at_once_even_in_a_thread_of_the_pool() -> None:
     assert threads.both(lambda: 1, lambda: threads.both(lambda: 2, lambda: 3)) == (1, (2, 3))
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="forks")
-@pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of forks of a process with threads
-def test_a_forked_process_makes_threads_of_its_own() -> None:
+def fork() -> None:
     assert met() == [0, 1]
     with multiprocessing.get_context("fork").Pool(1) as child:
         assert child.apply_async(met).get(timeout=20) == [0, 1]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="forks")
+def test_a_forked_process_makes_threads_of_its_own() -> None:
+    """By a process of its own, without the threads and handlers of this one."""
+    program = [sys.executable, "-c", "import test_threads; test_threads.fork()"]
+    subprocess.run(program, cwd=Path(__file__).parent, check=True, timeout=60)
