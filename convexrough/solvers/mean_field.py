@@ -14,6 +14,7 @@ import numpy as np
 
 from convexrough.arrays import Array
 from convexrough.normal.law import on_hertz_pressure, smooth_reach
+from convexrough.normal.load_control import shifted_to_load
 from convexrough.normal.problem import NormalProblem
 from convexrough.sphere import hertz
 
@@ -84,6 +85,10 @@ def _mean_field(problem: NormalProblem) -> Array | None:
         touching = np.sqrt(smooth_reach(problem)), problem.scene.mean_radius
         smooth = hertz.surface_displacement(middle, *touching) / problem.units.length
     w = SUNK * smooth
+    if problem.load is not None:
+        bare = offsets - between(w, places[some])
+        part = problem.load * len(bare) / len(problem)
+        approach = float((shifted_to_load(bare, coefficients, part) - bare)[0])
     for _ in range(STEPS):
         indentation = approach + offsets - between(w, places[some])
         loads = hertz.load(indentation, coefficients)
