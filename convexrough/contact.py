@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from convexrough import checks, solvers, threads
+from convexrough import checks, solvers
 from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.cached import Cached
@@ -280,8 +280,7 @@ def press(
     began = time.perf_counter()
     checks.instance("scene", scene, Scene)
     solver = solvers.named(solver)
-    with threads.one_where(4 * len(scene)):
-        return _contact(assembled(solver, scene, approach, load, influence), solver, start, began)
+    return _contact(assembled(solver, scene, approach, load, influence), solver, start, began)
 
 
 def solve(
@@ -343,7 +342,7 @@ def _contact(
     if start is not None:
         given = checks.array("start", start, length=len(scene), sign="not negative")
         first = given[problem.candidates] / force
-    with threads.one_where((4 if problem.influence.stored else 100) * len(problem)):
+    with problem.one_thread():
         if len(problem) == 0:  # no asperity can touch at so small an approach
             solution = Solution(np.zeros(0), float(problem.approach or 0.0), 0, 0.0)
         else:

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough import threads
 from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.errors import SolverError
 from convexrough.influence.coupling import Influence, Smoother
@@ -75,7 +76,8 @@ def correct(
         if direct:
             step = _factorise(influence, extra, touching, root, defect, balanced)
         else:
-            step = _in_two_parts(influence, extra, root, defect, balanced, tolerance)
+            with threads.one_thread():  # products with A use several themselves
+                step = _in_two_parts(influence, extra, root, defect, balanced, tolerance)
         if step is not None:
             return step
     raise SolverError("the matrix of a step is not positive definite", solver="newton")

@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from convexrough import checks, threads
+from convexrough import checks
 from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.influence import Kind, couple
@@ -300,7 +300,7 @@ class Depths:
 
     def __call__(self) -> tuple[Array, ...]:
         """(N,) [length] indentations of all asperities of the scene, and their error bounds."""
-        with threads.one_where(4 * len(self.problem)):
+        with self.problem.one_thread():
             beyond = self.of_screened
         whole = tuple(self.problem.to_scene(each) for each in (self.value, self.error))
         for each, outer in zip(whole, beyond, strict=True):

@@ -113,9 +113,10 @@ class Levels:
         from_top = None if box is None or trial is None else trial.loads.high
 
         def sought(start: Array | None) -> Level:
-            loads, trial = self._press(problem, start)
-            state = trial if is_of(trial, problem, loads) else refined_loads(problem, loads)
-            return proved(problem, state, box and box.closed(problem))
+            with problem.one_thread():
+                loads, trial = self._press(problem, start)
+                state = trial if is_of(trial, problem, loads) else refined_loads(problem, loads)
+                return proved(problem, state, box and box.closed(problem))
 
         if box is not None and box.scope == "local":
             return sought(from_top)

@@ -14,6 +14,7 @@ conditions are the contact law, with the gaps g:
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any, Self
@@ -21,7 +22,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough import checks
+from convexrough import checks, threads
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices, among_zeros, evenly, frozen, largest, taken
@@ -81,6 +82,11 @@ class NormalProblem:
 
     def __len__(self) -> int:
         return len(self.candidates)
+
+    def one_thread(self) -> AbstractContextManager[object]:
+        """`threads.one_where` products with A use several threads themselves."""
+        numbers = 4 if self.influence.stored else 100  # about that many for each asperity
+        return threads.one_where(numbers * len(self))
 
     @cached_property
     def exact(self) -> Data:
