@@ -14,7 +14,7 @@ Part = TypeVar("Part")
 One = TypeVar("One")
 Other = TypeVar("Other")
 
-#: Up to this many numbers, the work takes less time than starting threads.
+#: Up to this many numbers, the work takes less time than sharing it among threads.
 MANY = 2**17
 
 

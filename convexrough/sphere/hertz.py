@@ -63,12 +63,12 @@ def surface_displacement(distance: Number, contact_radius: Number, radius: Numbe
     It is a^2/R - r^2/(2R) inside the contact. Outside it is (1/(pi R)) [(2 a^2 - r^2) asin(a/r) +
     a sqrt(r^2 - a^2)], which equals r^2 (sin 2s / 2 - s cos 2s) / (pi R) with s = asin(a/r).
     """
-    a, r = contact_radius, np.asarray(distance, dtype=np.float64)
-    displacement, outside = np.asarray(a**2 / radius - r**2 / (2 * radius)), r > a
+    r, a, R = np.broadcast_arrays(np.asarray(distance, np.float64), contact_radius, radius)
+    displacement, outside = np.asarray(a**2 / R - r**2 / (2 * R)), r > a
     outer = r[outside]
-    s = np.arcsin(a / outer)
+    s = np.arcsin(a[outside] / outer)
     twice = 2.0 * s * np.sin(s) ** 2 - less_sine(2.0 * s) / 2.0  # no cancellation
-    displacement[outside] = outer**2 * twice / (np.pi * radius)
+    displacement[outside] = outer**2 * twice / (np.pi * R[outside])
     return displacement
 
 
