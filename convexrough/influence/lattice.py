@@ -374,11 +374,11 @@ class LatticeInfluence(coupling.Influence):
         return Ball.around(change * unit, 1.01 * error * unit)
 
     def smoother(self, root: Array) -> coupling.Smoother:
-        blocks: Blocks | None = self._kept.get("blocks")
-        if blocks is None:
-            cells = np.stack(self.cells)
-            blocks = self._keep("blocks", Blocks.of(cells, self.box.basis, self._unit))
-        return blocks.smoother(root)
+        return self._blocks.smoother(root)
+
+    @cached_property
+    def _blocks(self) -> Blocks:
+        return Blocks.of(self.cells, self.box.basis, self._unit)
 
 
 def _largest_sum(values: Array, apart: int) -> float:

@@ -11,6 +11,7 @@ conjugate gradients, not the answer.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -86,15 +87,15 @@ class Blocks:
     own: float  # mean of 1 / r over two different asperities of one block
 
     @classmethod
-    def of(cls, cells: Indices, basis: Array, scale: float) -> Blocks:
-        """For asperities in these cells (2, n) of a lattice.
+    def of(cls, cells: Iterable[Indices], basis: Array, scale: float) -> Blocks:
+        """For asperities in these cells of a lattice: (n,) rows and (n,) columns.
 
         basis : reduced, with a shorter vector of length 1
         scale : the product A_ij r_ij, with the distances r_ij in the unit of `basis`
         """
         from scipy.fft import next_fast_len
 
-        i, j = cells // BLOCK
+        i, j = (each // BLOCK for each in cells)
         rows, columns = int(i.max()) + 1, int(j.max()) + 1
         size = next_fast_len(rows, real=True), next_fast_len(columns, real=True)
         block = i * _stride(size) + j
