@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from functools import cache
 from typing import Any, TypeVar
@@ -39,11 +39,11 @@ def each(work: Callable[[Part], object], parts: Iterable[Part], threads: int) ->
         for part in todo:
             work(part)
 
-    others = [_pool().submit(some) for _ in range(threads - 1)]
+    others = [_submitted(some) for _ in range(threads - 1)]
     try:
         some()
     finally:
-        started = [other for other in others if not other.cancel()]
+        started = [other for other in others if other and not other.cancel()]
         wait(started)
     for other in started:
         other.result()  # raises its error
@@ -51,9 +51,17 @@ def each(work: Callable[[Part], object], parts: Iterable[Part], threads: int) ->
 
 def both(first: Callable[[], One], second: Callable[[], Other]) -> tuple[One, Other]:
     """The results of first() and second(), which run at the same time."""
-    other = _pool().submit(second)
+    other = _submitted(second)
     found = first()
-    return found, second() if other.cancel() else other.result()
+    return found, second() if other is None or other.cancel() else other.result()
+
+
+def _submitted(work: Callable[[], One]) -> Future[One] | None:
+    """The future of work() in another thread; None if the process ends and no thread can start."""
+    try:
+        return _pool().submit(work)
+    except RuntimeError:
+        return None
 
 
 @cache

@@ -4,8 +4,10 @@ import multiprocessing
 import subprocess
 import sys
 import threading
+import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import pytest
 from threadpoolctl import threadpool_info
@@ -73,8 +75,25 @@ def fork() -> None:
         assert child.apply_async(met).get(timeout=20) == [0, 1]
 
 
+def end() -> None:
+    def late() -> None:
+        time.sleep(0.2)  # the first thread has ended
+        print(squares(), threads.both(lambda: 1, lambda: 2))
+
+    threading.Thread(target=late).start()
+
+
+def output_of(name: str) -> str:
+    """What this function prints, in a process of its own, without threads and handlers of this."""
+    program = [sys.executable, "-c", f"import test_threads; test_threads.{name}()"]
+    options: dict[str, Any] = dict(cwd=Path(__file__).parent, check=True, timeout=60, text=True)
+    return subprocess.run(program, stdout=subprocess.PIPE, **options).stdout
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="forks")
 def test_a_forked_process_makes_threads_of_its_own() -> None:
-    """By a process of its own, without the threads and handlers of this one."""
-    program = [sys.executable, "-c", "import test_threads; test_threads.fork()"]
-    subprocess.run(program, cwd=Path(__file__).parent, check=True, timeout=60)
+    assert output_of("fork") == ""
+
+
+def test_work_is_done_after_the_first_thread_has_ended() -> None:
+    assert output_of("end").split("\n")[0] == "[0, 1, 4] (1, 2)"
