@@ -1,11 +1,11 @@
 """Scenes with friction, pressed and along load paths, that the tests of shear share."""
 
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
-from scenes import EVERY, MATERIAL, hexagonal
+from scenes import EVERY, hexagonal, on_sphere
 
 import convexrough as cr
 from convexrough.arrays import Array
@@ -67,10 +67,8 @@ def follow(name: str, points: list[tuple[float, float]]) -> cr.LoadPath:
     return cr.load_path(scene, loads=loads, forces=forces)
 
 
-def on_flat(points: Any, tip_radii: Any, heights: Any) -> cr.Scene:
-    """Asperities under a sphere so large that it is flat where they are, with friction."""
-    asperities = cr.Asperities(points, tip_radii, heights)
-    return cr.Scene(1e6, asperities, MATERIAL, friction=0.5, geometry="summit")
+#: Asperities under a sphere so large that it is flat where they are, with friction.
+on_flat = partial(on_sphere, radius=1e6, friction=FRICTION)
 
 
 def ring(count: int) -> Array:
