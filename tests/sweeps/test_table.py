@@ -117,10 +117,12 @@ def test_rows_together_are_those_of_scenes_one_by_one(cycle: dict[str, list[floa
 
 
 def test_scenes_made_in_python() -> None:
+    """A number that is asked for twice, or swept, has one column."""
     scenes = [replace(paper(), sphere_radius=R, friction=0.5) for R in (0.9, 1.0, 1.1)]
-    loads = [1e-7, 2e-7, 3e-7]
-    table = swept(scenes, load=loads, cycle=[0.3], measure=["approach", "loss"])
-    assert table.columns[1:5] == ["normal.load", "seed", "status", "message"]
+    loads, asked = [1e-7, 2e-7, 3e-7], ("approach", "loss", "load", "normal.load", "load")
+    table = swept(scenes, load=loads, cycle=[0.3], measure=(name for name in asked))
+    assert table.columns[:5] == ["scene", "normal.load", "seed", "status", "message"]
+    assert table.columns[5:] == ["approach", "loss_0.3", "load"]
     assert numbers(table, "normal.load", "seed") == [loads, [-1, -1, -1]]
     for i, scene in enumerate(scenes):
         contact = cr.press(scene, load=loads[i])
@@ -139,12 +141,6 @@ def test_scenes_of_a_made_lattice_are_the_same_in_other_processes() -> None:
     assert contact.influence == again.influence
     assert again.scene.lattice.basis.tolist() == scene.lattice.basis.tolist()
     assert again.certificate.load_errors.tolist() == contact.certificate.load_errors.tolist()
-
-
-def test_a_swept_key_that_is_measured_has_one_column() -> None:
-    scenes, asked = [paper()] * 2, ("load", "normal.load", "load")
-    table = swept(scenes, load=[1e-7, 2e-7], measure=(name for name in asked))
-    assert table.columns == ["scene", "normal.load", "seed", "status", "message", "load"]
 
 
 def test_a_file_that_changes_during_a_sweep(tmp_path: Path) -> None:
