@@ -270,16 +270,13 @@ def test_the_spelling_of_a_heading(tmp_path: Path, name: str) -> None:
     assert read_summits(path, tip_radius=None, how=how).tip_radii.tolist() == [2]
 
 
-def test_summits_without_a_header(tmp_path: Path) -> None:
-    """Columns that were chosen by number leave out others, such as an index."""
-    path, how = tmp_path / put(tmp_path, "7,0,0.5\n8,1,2\n"), Reading(columns={"x": "2", "y": "3"})
-    assert read_summits(path, tip_radius=1.0, how=how).positions.tolist() == [[0, 0.5], [1, 2]]
-
-
-def test_titles_above_columns_without_names(tmp_path: Path) -> None:
-    """They are no second row of the heading."""
-    path = tmp_path / put(tmp_path, "File,Operator,,,\n,,x,y,tip_radius\nA,0,1,2,3\nA,1,2,2,3\n")
-    assert read_summits(path, tip_radius=None).positions.tolist() == [[1, 2], [2, 2]]
+def test_summits_beside_columns_without_names(tmp_path: Path) -> None:
+    """Left out by numbers of columns; and with titles above, which are no row of the heading."""
+    titled = "File,Operator,,,\n,,x,y,tip_radius\nA,0,1,2,3\nA,1,2,2,3\n"
+    for content, columns in (("7,1,2\n8,2,2\n", {"x": "2", "y": "3"}), (titled, {})):
+        path, radius = tmp_path / put(tmp_path, content), 1.0 if columns else None
+        found = read_summits(path, tip_radius=radius, how=Reading(columns=columns))
+        assert found.positions.tolist() == [[1, 2], [2, 2]]
 
 
 KEYED = Reading(keyed=True)  # as for the file of a scene
