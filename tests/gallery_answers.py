@@ -16,8 +16,9 @@ from typing import Any
 
 import numpy as np
 from flint import arb, ctx
-from multiprecision import NotProved, slide
+from multiprecision import NotProved
 from scenes import solve_exactly
+from status_audit import Dragged, slid_from
 
 import convexrough as cr
 from convexrough.gallery import cases
@@ -44,21 +45,16 @@ def answer(case: dict[str, Any]) -> dict[str, Any]:
         "load": digits(full.load),
         "loads": [digits(load) for load in full.loads],
         "gaps": [digits(gap) for gap in full.gaps],
-        **sheared(scene, full, case["shear_force"]),
+        **sheared(contact, full, case["shear_force"]),
     }
 
 
-def sheared(scene: cr.Scene, full: Any, force: float) -> dict[str, Any]:
+def sheared(contact: cr.Contact, full: Any, force: float) -> dict[str, Any]:
     """Nothing where an asperity would be dragged along."""
     with ctx.workdps(DIGITS + 30):
-        f, nu = arb(scene.friction), arb(scene.material.poisson_ratio)
-        left = full.load - arb(force) / f
-        loads = np.array([float(load.mid()) for load in full.loads])
-        start = loads * float((left / full.load).mid())
-        contact = cr.press(scene, load=float(left.mid()), start=start)
-        reduced = solve_exactly(scene, load=left, start=contact.loads, digits=DIGITS)
-        slid = slide(f, nu, full, reduced)
-        if any(each < 0 for each in slid.forces):
+        try:
+            slid = slid_from(contact, full, force, DIGITS)
+        except Dragged:
             return {"forces": [], "slips": [], "displacement": ""}
         return {
             "forces": [digits(each) for each in slid.forces],

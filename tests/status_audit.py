@@ -214,15 +214,16 @@ ATTACKS = (
 )
 
 
-def _slid(contact: cr.Contact, full: Any, force: Any) -> Friction | None:
-    """The exact state of first loading."""
-    left = full.load - arb(force) / arb(FRICTION)
+def slid_from(contact: cr.Contact, full: Any, force: Any, digits: int = DIGITS) -> Friction | None:
+    """The exact state of first loading; none at gross sliding."""
+    scene, friction = contact.scene, contact.scene.friction
+    left = full.load - arb(force) / arb(friction)
     if not left > 0:
         return None
     found = cr.shear(contact, force=float(force)).forces
-    start = np.maximum(contact.loads - found / FRICTION, 0.0) + 1e-30 * contact.load
-    reduced = solve_exactly(contact.scene, load=left.mid(), start=start, digits=DIGITS)
-    slid = slide(arb(FRICTION), arb(contact.scene.material.poisson_ratio), full, reduced)
+    start = np.maximum(contact.loads - found / friction, 0.0) + 1e-30 * contact.load
+    reduced = solve_exactly(scene, load=left, start=start, digits=digits)
+    slid = slide(arb(friction), arb(scene.material.poisson_ratio), full, reduced)
     if any(q < 0 for q in slid.forces):
         raise Dragged
     return slid
@@ -234,7 +235,7 @@ def _audit_shear(kind: str, contact: cr.Contact, full: Any, fraction: float, tal
     with ctx.workdps(DIGITS + 30):
         try:
             # f P to rounding is read as f P
-            exact = None if fraction == 1 else _slid(contact, full, force)
+            exact = None if fraction == 1 else slid_from(contact, full, force)
         except Dragged:
             return
         forces = exact.forces if exact else [FRICTION * p for p in full.loads]
@@ -265,7 +266,7 @@ def _audit_history(contact: cr.Contact, full: Any, force: float, there: Friction
     past = cr.history(contact, forces=[force, -0.25 * force, force, -force])
     with ctx.workdps(DIGITS + 30):
         try:
-            inner = _slid(contact, full, (arb(force) - arb(-0.25 * force)) / 2)
+            inner = slid_from(contact, full, (arb(force) - arb(-0.25 * force)) / 2)
         except Dragged:
             return
         assert inner is not None  # below the force that is
