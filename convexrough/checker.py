@@ -608,7 +608,7 @@ def check(document: Any) -> str:
 
 
 def main(arguments: Sequence[str]) -> int:
-    if sys.stderr.isatty():  # then a line shows the progress
+    if sys.stderr is not None and sys.stderr.isatty():  # then a line shows the progress
         progress = logging.StreamHandler()
         progress.terminator = "\033[K\r"
         LOGGER.addHandler(progress)

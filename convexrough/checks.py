@@ -240,11 +240,11 @@ def fits_in_memory(
 
     available = psutil.virtual_memory().available
     if needed > available:
-        most = (available / bytes_each) ** (1.0 / power)
+        most = int((available / bytes_each) ** (1.0 / power))
         raise InputError(
             what,
             found=f"{count:.3g} {noun} ({needed / 2**30:.3g} GiB)",
-            expected=f"at most {most:.3g} for the {available / 2**30:.3g} GiB of memory available",
+            expected=f"at most {most:,} for the {available / 2**30:.3g} GiB of memory available",
         )
 
 

@@ -175,9 +175,11 @@ def progress(message: str) -> Iterator[None]:
     """
     from convexrough.progress import NOTE, logged
 
-    with redirect_stdout(sys.stderr), ExitStack() as stack:
+    with ExitStack() as stack:
         stack.enter_context(logged(lambda record: say_aside("note", record.getMessage()), NOTE))
-        if sys.stderr.isatty():
+        if sys.stderr is not None:  # it is None where a shell closed it
+            stack.enter_context(redirect_stdout(sys.stderr))
+        if sys.stderr is not None and sys.stderr.isatty():
             from rich.console import Console
 
             line = stack.enter_context(Console(stderr=True).status(message))

@@ -105,6 +105,7 @@ def _numbers(values: NDArray[np.generic]) -> Array:
 
 def instrument_map(path: Path) -> HeightGrid:
     """The first map of heights in a file that SurfaceTopography can read."""
+    path.open("rb").close()  # raises the usual error for a missing file
     try:
         with catch_warnings(action="ignore", category=ImportWarning):  # MPI is optional
             from SurfaceTopography import open_topography
@@ -112,7 +113,6 @@ def instrument_map(path: Path) -> HeightGrid:
         expected = "a map in .npy, .npz, .mat, text (.csv, .txt, .dat, .asc, .tsv, .xyz) or .xlsx; "
         expected += "an instrument's file needs SurfaceTopography: pip install SurfaceTopography"
         raise FileError(f"{path}: found {path.suffix}, expected {expected}") from error
-    path.open("rb").close()  # raises the usual error for a missing file
     try:
         with foreign(), open_topography(str(path)) as reader:
             maps = [channel for channel in reader.height_channels if channel.dim == 2]

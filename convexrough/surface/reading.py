@@ -108,6 +108,8 @@ def read(
     """
     path = checks.path("path", path, "the name of a file with a map")
     with blamed_on(path, unless_known=True):
+        if not isinstance(fill, (bool, np.bool_)):
+            raise InputError("fill", found=fill, expected="True or False")
         kind = path.suffix.lower()
         with reading(path):
             binary = kind == ".dat" and path.read_bytes()[:3] == map_arrays.METROPRO
@@ -274,7 +276,8 @@ def _refuse_coordinates(heights: Array) -> None:
                 line = lines[one]
                 if _even(line[1:]) and not _even(lines[other, 1:]):
                     raise _not_heights(f"{place} {number}", line[~np.isnan(line)])
-            off, spread = lines[-1] - lines[:-1].mean(axis=0), lines[:-1].std(axis=0)
+            with np.errstate(invalid="ignore"):  # heights may be infinite: holes
+                off, spread = lines[-1] - lines[:-1].mean(axis=0), lines[:-1].std(axis=0)
             if (np.abs(off) < 0.01 * spread).all():
                 found = f"the means of the {'columns' if place == 'row' else 'rows'}"
                 raise InputError(f"last {place}", found=found, expected="heights alone")

@@ -64,6 +64,10 @@ def named_arrays(path: Path) -> dict[str, Any]:
     if own := {".mat": _matlab, ".parquet": _parquet}.get(path.suffix.lower()):
         return own(path)
     with path.open("rb") as raw, foreign():
+        first = raw.read(6)
+        if not first.startswith((b"\x93NUMPY", b"PK")):
+            raise ValueError(f"it begins with {first.decode('latin-1')!r}")
+        raw.seek(0)
         loaded = np.load(raw, allow_pickle=False)
         named = {"": loaded} if isinstance(loaded, np.ndarray) else loaded
         arrays = {name: np.asarray(values) for name, values in named.items()}

@@ -13,6 +13,7 @@ import pytest
 from scene_files import EVERYTHING, FRICTION, WITHIN, rows, scene_text
 
 import convexrough as cr
+from convexrough.cli.common import progress
 from convexrough.run.scene_file import read_scene
 from convexrough.run.stages import STAGES
 
@@ -55,6 +56,12 @@ def test_the_folder_is_refused_before_computing(command: Any, monkeypatch: Any) 
     said = "file: cannot hold results: File exists\n"
     assert command("run", "a.toml", "--out", "file").refuses(said)
     assert command("run", "a.toml", "--out", "file/sub").status == 2
+
+
+def test_standard_error_may_be_closed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.stderr", None)
+    with progress("pressing"):
+        print("what a solver prints")
 
 
 def test_nothing_touches(command: Any, tmp_path: Path) -> None:

@@ -245,6 +245,7 @@ WRONG: list[tuple[str, dict[str, Any], str]] = [
     ("# x y quality\n0,0,1\n1,0,2\n", ONE, "columns: found x, y, quality, expected a column"),
     (INDEXED, ONE, "columns: found 4 columns without a header, two of which are coordinates"),
     ("@", {"pixel": (1.0, 30.0)}, "found 1 by 30, expected sides at most 1 to 10"),
+    ("@", ONE | {"fill": "no"}, "fill: found no, expected True or False"),
     ("@", ONE | {"unit": 5}, "unit: found 5, expected a name, as"),
     ("@", ONE | {"unit": "parsec"}, "unit: found 'parsec', expected a unit of le"),
     ("@", ONE | {"height_unit": "nm"}, "unit: found none, expected the unit of"),
@@ -356,6 +357,8 @@ def test_without_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
         raw(tmp_path / "a.png", b"PNG")
     with pytest.raises(cr.FileError, match=said.replace("png", "dat")):
         raw(tmp_path / "a.dat", METROPRO)
+    with pytest.raises(cr.FileError, match=r"missing\.x3p: cannot be read: No such file"):
+        cr.surface.read(tmp_path / "missing.x3p")
 
 
 @pytest.mark.skipif(

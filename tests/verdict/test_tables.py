@@ -157,6 +157,8 @@ def test_text_in_arrays_that_is_none(tmp_path: Path) -> None:
     contents = numbers.replace(b"'<u4'", b"'<U3'").replace(b"(9,)", b"(3,)")
     with pytest.raises(cr.FileError, match=r"not an \.npy file"):
         read(tmp_path, contents, "a.npy")
+    with pytest.raises(cr.FileError, match=r"not an \.npy file: it begins with '1 2 3"):
+        read(tmp_path, b"1 2 3\n", "b.npy")
 
 
 def test_parquet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
