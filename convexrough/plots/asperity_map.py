@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
@@ -143,10 +144,14 @@ def draw_values(
     values : (n,), one for each contact disc; or (k, n), of discs with `radii` (k, n) [length], the
         largest first;  most : the end of the colour scale; default: the largest absolute value
     signed : the colours run from dark for negative values to light for positive ones
+
+    Discs without a finite value are grey; if all are, a text replaces the colour bar.
     """
-    most = float(np.abs(values).max()) or 1.0 if most is None else most
+    values = np.where(np.isfinite(values), values, np.nan)  # an infinite one would take a colour
+    most = float(np.nanmax(np.abs(values), initial=0.0)) or 1.0 if most is None else most
     spread = Normalize(-most if signed else 0.0, most)
-    colours = ScalarMappable(spread, "viridis" if signed else COLOURS)
+    shades = matplotlib.colormaps["viridis" if signed else COLOURS].with_extremes(bad=UNKNOWN)
+    colours = ScalarMappable(spread, shades)
     rim = SMOOTH if radii is None else None
     sizes = np.atleast_2d(scale.contact.contact_radii if radii is None else radii)
     layers = [
@@ -154,8 +159,17 @@ def draw_values(
         for k, (radius, each) in enumerate(zip(sizes, np.atleast_2d(values), strict=True))
     ]
     draw_map(axes, scale.points, scale.length, layers, outline=scale.axes)
-    style.bar(axes, colours, name, above=not signed)
+    if np.isfinite(values).any():
+        style.bar(axes, colours, name, above=not signed)
+    else:
+        style.write_inside(axes, "not known")
     return colours
+
+
+def unknown_handles(radii: Array, *values: Array) -> list[Line2D]:
+    """A legend entry for discs without a finite value, if there are any."""
+    unknown = any((~np.isfinite(each) & (radii > 0)).any() for each in values)
+    return [style.disc_handle(UNKNOWN, "not known")] if unknown else []
 
 
 def draw_statuses(axes: Axes, contact: Contact, status: NDArray[np.str_]) -> None:

@@ -16,7 +16,7 @@ from convexrough.friction.cycle import Cycle, Loop
 from convexrough.friction.cycle import loops as steady_loops
 from convexrough.friction.fretting import Fretting
 from convexrough.plots import style
-from convexrough.plots.asperity_map import draw_values
+from convexrough.plots.asperity_map import draw_values, unknown_handles
 from convexrough.plots.notebook import Figure, Figures, no_contact, panels
 from convexrough.plots.steady import draw_closed
 from convexrough.plots.style import DASHED, DOUBLE, FAINT, ROUGH, SMOOTH, TICK, Scale
@@ -243,15 +243,19 @@ def fretting_figures(worn: Fretting) -> Figures:
     traction = style.measure(most, pressure, f"(f{scale.pressure.symbol})")
     energy = style.measure(_largest(worn.losses), scale.units.name("work"), "W_m")
     draw_slip(maps[0], worn, scale)
+    radii = worn.contact.contact_radii
+    unknown = unknown_handles(radii, worn.slip_amplitudes, worn.losses, worn.largest_tractions)
     for axes, values, unit, name, symbol in (
         (maps[1], worn.losses, energy, "energy lost per cycle", "W_i"),
         (maps[2], worn.mean_tractions, traction, "mean traction", "\\bar q_i"),
         (maps[3], worn.largest_tractions, traction, "largest traction", "q_i"),
     ):
-        draw_values(axes, scale, np.nan_to_num(unit.of(values)), unit.short(symbol))
+        draw_values(axes, scale, unit.of(values), unit.short(symbol))
         style.title(axes, name)
     for axes in maps:
         axes.label_outer()
+    if unknown:
+        style.legend(figure, "outside", handles=unknown, loc="outside lower center")
     low, high = worn.minimum / scale.limit, worn.maximum / scale.limit
     between = f"cycle of $Q/(fP)$ from {low:.4g} to {high:.4g}".replace("-", "\u2212")
     figure.suptitle(between, fontsize=TICK)
@@ -260,9 +264,13 @@ def fretting_figures(worn: Fretting) -> Figures:
 
 def draw_slip(axes: Axes, worn: Fretting, scale: Scale | None = None) -> None:
     """Draw the map of slip amplitudes."""
+    alone = scale is None
     scale, unit = scale or Scale(worn.contact), worn.contact.scene.units.length
     slip = style.measure(_largest(worn.slip_amplitudes) if unit else scale.travel, unit, "X_0")
-    draw_values(axes, scale, np.nan_to_num(slip.of(worn.slip_amplitudes)), slip.short("s_i"))
+    draw_values(axes, scale, slip.of(worn.slip_amplitudes), slip.short("s_i"))
+    unknown = unknown_handles(worn.contact.contact_radii, worn.slip_amplitudes)
+    if alone and unknown:
+        style.legend(axes, "below", handles=unknown)
     style.title(axes, "slip amplitude at the rim")
 
 

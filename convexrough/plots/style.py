@@ -104,6 +104,11 @@ def write_beside(axes: Axes, text: str, place: Any) -> None:
 def say_nothing(axes: Axes, why: str = "no contact") -> None:
     """Write a reason into an empty panel, and remove the ticks."""
     axes.set(xticks=[], yticks=[])
+    write_inside(axes, why)
+
+
+def write_inside(axes: Axes, why: str) -> None:
+    """Write a text into the middle of a panel."""
     axes.text(0.5, 0.5, why, transform=axes.transAxes, fontsize=LABEL, ha="center", va="center")
 
 

@@ -19,7 +19,7 @@ import convexrough as cr
 from convexrough import fields, plots
 from convexrough.paper.example import PaperStates
 from convexrough.paper.figures import paper_figures
-from convexrough.plots.asperity_map import LOOKS, SLIDING
+from convexrough.plots.asperity_map import LOOKS, SLIDING, UNKNOWN
 from convexrough.sphere.smooth import smooth
 
 #: Scenes and what is prescribed, if not the approach of the paper.
@@ -187,6 +187,21 @@ def test_what_a_closed_path_settles_to() -> None:
     assert_allclose(dot, expected, rtol=1e-12, atol=1e-9)
     for status in LOOKS:
         assert discs(place, status) == int((found.status == status).sum())
+
+
+def test_unknown_wear_is_grey() -> None:
+    P = LARGEST["paper"]
+    worn = cr.fretting(cr.steady(PAPER, loads=[P, 0.02 * P], forces=[0.2 * P, -0.005 * P]))
+    fits(figure := plots.fretting_figures(worn)["fretting"])
+    assert [text.get_text() for text in figure.legends[0].texts] == ["not known"]
+    (drawn,) = figure.axes[0].collections
+    unknown = np.isnan(worn.slip_amplitudes[worn.contact.loads > 0])
+    grey = np.asarray(to_rgba(UNKNOWN))
+    assert ((np.asarray(drawn.get_facecolor()) == grey).all(axis=1) == unknown).all()
+    nothing = dataclasses.replace(worn, slip_amplitudes=np.full(len(PAPER), np.nan))
+    figure = nothing.plot().figure
+    assert len(figure.axes) == 1  # no colour bar
+    assert [text.get_text() for text in texts(figure)].count("not known") == 2
 
 
 def test_the_colours_and_the_profile_show_the_pressure() -> None:
