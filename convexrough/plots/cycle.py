@@ -12,12 +12,13 @@ from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
 
 from convexrough import checks
 from convexrough.arrays import Array
+from convexrough.errors import InputError
 from convexrough.friction.cycle import Cycle, Loop
 from convexrough.friction.cycle import loops as steady_loops
 from convexrough.friction.fretting import Fretting
 from convexrough.plots import style
 from convexrough.plots.asperity_map import draw_values, unknown_handles
-from convexrough.plots.notebook import Figure, Figures, no_contact, panels
+from convexrough.plots.notebook import Figure, Figures, no_contact, one_contact, panels
 from convexrough.plots.steady import draw_closed
 from convexrough.plots.style import DASHED, DOUBLE, FAINT, ROUGH, SMOOTH, TICK, Scale
 from convexrough.scene.rings import one_of_each_ring
@@ -41,6 +42,8 @@ def cycle_figures(cycles: Sequence[Cycle], *, loops: Sequence[Loop] | None = Non
         the centre
     "loss" : energy against amplitude, for cycles of several ranges
 
+    Raises InputError for cycles of several contacts, or loops that are not those of the cycles.
+
     >>> forces = 0.5 * contact.load * np.array([0.1, 0.3, 0.5])
     >>> print(*cr.plots.cycle_figures(cr.cycles(contact, forces)))
     hysteresis loss
@@ -49,7 +52,9 @@ def cycle_figures(cycles: Sequence[Cycle], *, loops: Sequence[Loop] | None = Non
     cycles = list(cycles)
     if not cycles:
         return Figures()
-    contact = cycles[0].contact
+    contact = one_contact("cycles", cycles, Cycle)
+    if loops is not None:
+        _check_loops(cycles, loops)
     several = len(np.unique([each.maximum - each.minimum for each in cycles])) > 1
     if not contact.loads.any():
         return no_contact("hysteresis", *(["loss"] if several else []))
@@ -73,6 +78,19 @@ def cycle_figures(cycles: Sequence[Cycle], *, loops: Sequence[Loop] | None = Non
     if several:
         figures["loss"] = _loss_figure([cycles[i] for i in order], scale)
     return figures
+
+
+def _check_loops(cycles: Sequence[Cycle], loops: Sequence[Loop]) -> None:
+    checks.sequence("loops", loops, "a list of loops")
+    if len(loops) != len(cycles):
+        raise InputError("loops", found=len(loops), expected=f"{len(cycles)}, one per cycle")
+    for k, (cycle, loop) in enumerate(zip(cycles, loops, strict=True)):
+        checks.instance(f"loops[{k}]", loop, Loop)
+        ends, room = (loop.forces.max(), loop.forces.min()), 1e-9 * cycle.force_amplitude
+        other = not np.array_equal(loop.asperities, loops[0].asperities)
+        if other or not np.allclose(ends, (cycle.maximum, cycle.minimum), rtol=1e-9, atol=room):
+            expected = f"that of cycles[{k}], with the asperities of loops[0]"
+            raise InputError(f"loops[{k}]", found="another loop", expected=expected)
 
 
 def loops_figure(

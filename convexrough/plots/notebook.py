@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import sys
 from base64 import b64encode
+from collections.abc import Sequence
 from importlib import import_module
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backend_bases import get_registered_canvas_class
@@ -104,6 +106,31 @@ def no_contact(*stems: str) -> Figures:
     return figures
 
 
+def one_contact(what: str, results: Sequence[Any], *kinds: Any) -> Contact:
+    """The contact of all results; raises InputError for another one, or a result of other kinds."""
+    for k, each in enumerate(results):
+        if not isinstance(each, kinds):
+            expected = " or ".join(f"a {kind.__name__}" for kind in kinds)
+            raise InputError(f"{what}[{k}]", found=f"type {type(each).__name__}", expected=expected)
+        if not _same(each.contact, results[0].contact):
+            expected = f"one of the contact of {what}[0]"
+            raise InputError(f"{what}[{k}]", found="a result of another contact", expected=expected)
+    contact: Contact = results[0].contact
+    return contact
+
+
+def _same(a: Contact, b: Contact) -> bool:
+    """True if two contacts are one, or have equal scenes and loads."""
+    if a is b:
+        return True
+    arrays = [
+        (it.loads, it.scene.contact_points, it.scene.relative_radii, it.scene.offsets)
+        for it in (a, b)
+    ]
+    known = [(it.scene.material, it.scene.friction, it.scene.units) for it in (a, b)]
+    return known[0] == known[1] and all(map(np.array_equal, *arrays))
+
+
 def as_png(figure: MatplotlibFigure, dpi: int = 100) -> bytes:
     figure.savefig(file := BytesIO(), format="png", dpi=dpi)
     return file.getvalue()
@@ -169,17 +196,25 @@ def thumbnail(result: object) -> str:
     return image_tag(type(result).__name__, figure, 80)
 
 
-def save(figure: MatplotlibFigure, path: Path, form: str = "png", dpi: int = 200) -> None:
+def save(
+    figure: MatplotlibFigure, path: str | Path, form: str | None = None, dpi: float = 200
+) -> None:
     """Write a figure as PNG, SVG or PDF, with text kept as text; `dpi` is its resolution.
 
-    Raises InputError for another format, or a `dpi` that is not from 50 to 600.
+    form : "png", "svg" or "pdf"; default: as the suffix of the path says, or PNG without a suffix
+
+    Raises InputError for another format, a suffix that names another than `form`, or a `dpi` that
+    is not from 50 to 600.
 
     >>> cr.plots.save(contact.plot().figure, folder / "pressure.png", dpi=100)
     """
-    if form not in FORMATS:
-        raise InputError("form", found=repr(form), expected=f"one of {', '.join(FORMATS)}")
-    if not LEAST_DPI <= dpi <= MOST_DPI:
-        raise InputError("dpi", found=dpi, expected=f"from {LEAST_DPI} to {MOST_DPI}")
+    checks.instance("figure", figure, MatplotlibFigure)
+    suffix = checks.path("path", path, "the path of a file").suffix[1:].lower()
+    what, form = ("path", suffix or "png") if form is None else ("form", form)
+    if form not in FORMATS or (suffix in FORMATS and suffix != form):
+        expected = f"one of {', '.join(FORMATS)}, that of the path if it has a suffix"
+        raise InputError(what, found=repr(form), expected=expected)
+    dpi = checks.between("dpi", dpi, LEAST_DPI, MOST_DPI)
     canvas: Any = get_registered_canvas_class(form)(figure)
     before, figure.dpi = figure.dpi, dpi
     try:

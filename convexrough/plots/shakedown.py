@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 
+from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.melan.shakedown import Shakedown
 from convexrough.plots import style
@@ -33,6 +34,7 @@ def shakedown_figures(found: Shakedown) -> Figures:
     >>> print(*cr.plots.shakedown_figures(found))
     shakedown shakedown_map
     """
+    checks.instance("found", found, Shakedown)
     figure, (axes,) = panels(SINGLE + 0.7, 3.4)
     draw_factors(axes, found)
     figures = Figures({"shakedown": figure})

@@ -14,7 +14,7 @@ from convexrough import checks
 from convexrough.friction.shear import ShearState
 from convexrough.plots import asperity_map as maps
 from convexrough.plots import style
-from convexrough.plots.notebook import Figures, no_contact
+from convexrough.plots.notebook import Figures, no_contact, one_contact
 from convexrough.plots.style import DASHED, DOTTED, FAINT, SMOOTH, Scale
 from convexrough.scene.rings import evenly_chosen
 from convexrough.vector_shear.state import VectorShearState
@@ -27,6 +27,8 @@ MOST_PANELS = 12
 def shear_figures(states: Sequence[ShearState]) -> Figures:
     """The maps of friction states of one contact, at most 12, evenly chosen.
 
+    Raises InputError for states of several contacts.
+
     "stick_slip" : contact discs with stick discs inside, sliding asperities, open ones; and
         contact and stick disc of the smooth sphere under the same forces
 
@@ -38,9 +40,10 @@ def shear_figures(states: Sequence[ShearState]) -> Figures:
     states = list(states)
     if not states:
         return Figures()
-    if not states[0].contact.loads.any():
+    contact = one_contact("states", states, ShearState, VectorShearState)
+    if not contact.loads.any():
         return no_contact("stick_slip")
-    scale, shown = Scale(states[0].contact), evenly_chosen(states, MOST_PANELS)
+    scale, shown = Scale(contact), evenly_chosen(states, MOST_PANELS)
     columns = maps.columns_of(len(shown))
     lines = 1 + (columns == 4) + any(style.not_proved(state) for state in shown)
     figure, places = maps.tiles(len(shown), lines)

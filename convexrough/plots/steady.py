@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.cycle import Cycle
@@ -38,6 +39,7 @@ def steady_figures(found: Cycle) -> Figures:
     >>> print(*cr.plots.steady_figures(found))
     steady
     """
+    checks.instance("found", found, Cycle)
     figure, (plane, chart) = panels(DOUBLE, 3.5, 1, 2)
     draw_closed(plane, found)
     layers = status_layers(found.status, found.contact.contact_radii)
@@ -61,6 +63,7 @@ def phase_figures(found: PhaseLosses) -> Figures:
     >>> print(*cr.plots.phase_figures(found))
     phase_losses
     """
+    checks.instance("found", found, PhaseLosses)
     figure, (axes,) = panels(style.SINGLE, 3.4)
     draw_losses(axes, found)
     return Figures({"phase_losses": figure})

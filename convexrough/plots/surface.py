@@ -8,6 +8,7 @@ from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter, NullLocator
 
+from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.contact import Contact
 from convexrough.plots import style
@@ -52,6 +53,13 @@ def surface_figures(
     >>> print(*cr.plots.surface_figures(scan, scan.summits(0.0), scan.summits(0.05)))
     map histograms
     """
+    checks.instance("surface", surface, Surface)
+    checks.instance("maxima", maxima, Summits)
+    checks.instance("summits", summits, Summits)
+    if curve is not None:
+        checks.instance("curve", curve, Provability)
+    if contact is not None:
+        checks.instance("contact", contact, Contact)
     figures = Figures({"map": _map(surface, summits, contact)})
     figures["histograms"] = _histograms(surface, maxima, summits)
     if curve is not None:

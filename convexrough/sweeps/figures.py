@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from convexrough import checks
 from convexrough.arrays import Array, Indices
 from convexrough.plots.notebook import new_axes
 from convexrough.plots.style import DOUBLE, ROUGH, SMOOTH, TICK, UNSURE, legend
@@ -36,6 +37,7 @@ def draw_quantiles(
         have bands of their own; otherwise the legend states the number of combinations
     """
     axes = new_axes((0.65 * DOUBLE, 3.0)) if axes is None else axes
+    checks.instance("axes", axes, Axes)
     names = list(dict.fromkeys(columns[over].tolist())) if columns[over].dtype.kind == "U" else []
     if names:
         axes.xaxis.update_units(names)  # type: ignore[no-untyped-call]  # in this order

@@ -21,6 +21,7 @@ from convexrough.paper.example import PaperStates
 from convexrough.paper.figures import paper_figures
 from convexrough.plots.asperity_map import LOOKS, SLIDING, UNKNOWN
 from convexrough.sphere.smooth import smooth
+from convexrough.sweeps.figures import draw_quantiles
 
 #: Scenes and what is prescribed, if not the approach of the paper.
 CASES: dict[str, tuple[cr.Scene, dict[str, float]]] = {
@@ -131,6 +132,37 @@ def test_the_path_passes_through_every_step() -> None:
     assert numbers == {"1, 5", "2", "3", "4"}  # the loop closes on its first point
 
 
+def test_what_cannot_be_drawn_is_refused() -> None:
+    one, other = contact("paper"), contact("rough")
+    two = cr.cycles(one, np.array([0.2, 0.4]) * one.load)
+    loops = cr.loops(two, 40)
+    again = cr.press(PAPER, approach=one.approach)  # an equal contact
+    assert plots.cycle_figures([two[0], cr.cycle(again, maximum=0.3 * again.load)])
+    assert plots.cycle_figures(two, loops=loops)
+    figure: Any = Figure()
+    five: Any = 5
+    for call, said in [
+        (lambda: plots.shear_figures([cr.shear(it, force=0) for it in (one, other)]),
+         r"states\[1\]: found a result of another contact"),
+        (lambda: plots.cycle_figures([two[0], cr.cycle(other, maximum=0)]), r"\[1\]: found a res"),
+        (lambda: plots.cycle_figures(two, loops=[]), "loops: found 0, expected 2, one per cycle"),
+        (lambda: plots.cycle_figures(two, loops=loops[::-1]), r"loops\[0\]: found another loop"),
+        (lambda: plots.shear_figures([five]), r"\[0\]: found type int, expected a ShearState or"),
+        (lambda: plots.cycle_figures([five]), r"cycles\[0\]: found type int, expected a Cycle"),
+        (lambda: plots.phase_figures(five), "found type int, expected PhaseLosses"),
+        (lambda: plots.steady_figures(five), "found type int, expected a Cycle"),
+        (lambda: plots.shakedown_figures(five), "found type int, expected a Shakedown"),
+        (lambda: plots.surface_figures(five, five, five), "surface: found type int"),
+        (lambda: draw_quantiles({}, "P", "R", [], five), "axes: found type int"),
+        (lambda: plots.save(five, "a.png"), "figure: found type int"),
+        (lambda: plots.save(figure, "a.jpg"), "path: found 'jpg', expected one of png, svg, pdf"),
+        (lambda: plots.save(figure, "a.pdf", "png"), "form: found 'png', .* that of the path"),
+        (lambda: plots.save(figure, "a.pdf", dpi=None), "dpi: found None"),  # type: ignore[arg-type]
+    ]:  # fmt: skip
+        with pytest.raises(cr.InputError, match=said):
+            call()
+
+
 def test_no_contact_is_said() -> None:
     nothing = contact("nothing in units")
     figures = (
@@ -225,7 +257,7 @@ def test_files_keep_their_text_and_pixels(tmp_path: Path) -> None:
     figure = Figure(figsize=(1, 1))
     figure.subplots().set_xlabel("load [mN]")
     for form in ("svg", "pdf", "png"):
-        plots.save(figure, tmp_path / f"a.{form}", form, dpi=600)
+        plots.save(figure, tmp_path / f"a.{form}", dpi=600)
     text = (tmp_path / "a.svg").read_text(encoding="utf-8")
     assert re.search(r"<text[^>]*>load \[mN\]</text>", text)
     assert (tmp_path / "a.pdf").read_bytes().startswith(b"%PDF")
