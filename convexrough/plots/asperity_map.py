@@ -19,7 +19,7 @@ from convexrough.arrays import Array, Number
 from convexrough.contact import Contact
 from convexrough.plots import style
 from convexrough.plots.notebook import Figure, panels
-from convexrough.plots.style import COLOURS, DASHED, DOUBLE, FAINT, SINGLE, SMOOTH, Scale
+from convexrough.plots.style import COLOURS, DASHED, DOUBLE, FAINT, SINGLE, SMOOTH, Scale, ink
 from convexrough.scene.neighbours import nearest_distances
 
 #: DENSE or more discs are stored as pixels in vector files. CROWDED or more discs are replaced by a
@@ -204,12 +204,13 @@ def draw_discs(axes: Axes, points: Array, layer: Layer) -> None:
 
 
 def draw_outline(
-    axes: Axes, semi_axes: Sequence[float], dashes: Any = DASHED, colour: str = SMOOTH
+    axes: Axes, semi_axes: Sequence[float], dashes: Any = DASHED, colour: str = ""
 ) -> None:
     """Draw an ellipse about the origin; nothing without semi-axes."""
     if semi_axes:
         width, height = (2.0 * axis for axis in semi_axes)
-        axes.add_patch(Ellipse((0, 0), width, height, fill=False, ls=dashes, lw=0.9, ec=colour))
+        edge = colour or ink()
+        axes.add_patch(Ellipse((0, 0), width, height, fill=False, ls=dashes, lw=0.9, ec=edge))
 
 
 def status_layers(

@@ -20,7 +20,7 @@ from convexrough.plots import style
 from convexrough.plots.asperity_map import draw_values, unknown_handles
 from convexrough.plots.notebook import Figure, Figures, no_contact, one_contact, panels
 from convexrough.plots.steady import draw_closed
-from convexrough.plots.style import DASHED, DOUBLE, FAINT, ROUGH, SMOOTH, TICK, Scale
+from convexrough.plots.style import DASHED, DOUBLE, FAINT, ROUGH, TICK, Scale, ink
 from convexrough.scene.rings import one_of_each_ring
 from convexrough.sphere import mindlin
 from convexrough.sphere.smooth import SmoothSphere
@@ -113,7 +113,7 @@ def loops_figure(
             draw_loop(axes, scale, loop, slope)
         end = loop.displacements[0] - slope * loop.forces[0]
         place = (x.of(end), q.of(loop.forces[0]))
-        look = {"fontsize": 7, "va": "center", "path_effects": style.HALO}
+        look = {"fontsize": 7, "va": "center", "path_effects": style.halo()}
         style.note(upright, _range(cycle, scale), place, (4, 2), **look)
     in_units = x.said and not x.symbol
     less = f"$X\\,/\\,{x.symbol} - \\frac{{2}}{{3}}\\,Q\\,/\\,(fP)$"
@@ -157,7 +157,7 @@ def draw_loop(axes: Axes, scale: Scale, loop: Loop, slope: float = 0.0) -> None:
     axes.plot(rough, scale.force.of(Q), color=ROUGH, lw=1.2, label="asperities")
     if scale.sphere is not None:
         smooth = scale.displacement.of(smooth_loop(scale.sphere, Q) - slope * Q)
-        axes.plot(smooth, scale.force.of(Q), color=SMOOTH, lw=1.0, ls=DASHED, label=scale.name)
+        axes.plot(smooth, scale.force.of(Q), color=ink(), lw=1.0, ls=DASHED, label=scale.name)
 
 
 def smooth_loop(sphere: SmoothSphere, forces: Array) -> Array:
@@ -217,7 +217,7 @@ def _loss_figure(cycles: Sequence[Cycle], scale: Scale) -> Figure:
     t = np.geomspace(min(0.7 * amplitude[0] / scale.limit, 0.3), 1.0, 300)
     if scale.sphere is not None:
         whole = w.of(scale.work) * mindlin.loss(t)
-        loss.plot(ends * t, whole, ls=DASHED, lw=1.1, color=SMOOTH, label=scale.name)
+        loss.plot(ends * t, whole, ls=DASHED, lw=1.1, color=ink(), label=scale.name)
     loss.plot(q.of(amplitude), w.of(rough), label="asperities", **marks)
     loss.set(xscale="log", yscale="log", xlim=(ends * t[0], ends))
     for axis in (loss.xaxis, loss.yaxis):  # at most 6 powers of ten; on a short axis also 2, 5
@@ -232,7 +232,7 @@ def _loss_figure(cycles: Sequence[Cycle], scale: Scale) -> Figure:
     if scale.sphere is None:
         style.say_nothing(ratio, "no smooth reference")
         return figure
-    ratio.axhline(1.0, ls=DASHED, lw=1.1, color=SMOOTH)
+    ratio.axhline(1.0, ls=DASHED, lw=1.1, color=ink())
     smooth = np.array([each.smooth_normalised for each in some]) * scale.work
     ratio.plot(q.of(amplitude), rough / smooth, **marks)
     ratio.set(xlim=(0.0, ends))

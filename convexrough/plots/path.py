@@ -17,7 +17,7 @@ from convexrough.plots import style
 from convexrough.plots.asperity_map import draw_map, label_tiles, status_layers, tiles
 from convexrough.plots.notebook import Figure, Figures, no_contact, panels
 from convexrough.plots.steady import PATTERNS, label_plane, name_statuses, vertices
-from convexrough.plots.style import DOUBLE, FAINT, SMOOTH, TICK, Scale
+from convexrough.plots.style import DOUBLE, FAINT, TICK, Scale, ink
 from convexrough.scene.rings import evenly_chosen
 from convexrough.sphere import hertz
 
@@ -84,7 +84,7 @@ def _draw_cost(axes: Axes, path: LoadPath, scale: Scale, fine: LoadPath) -> None
     at = np.add.outer(np.arange(m), _parts(each)).ravel()
     colours = _draw_darkening(axes, path, at, energy.of(fine.losses))
     if m <= MOST_NUMBERS:
-        axes.plot(np.arange(1.0, m + 1), energy.of(path.losses), "o", ms=3.5, color=SMOOTH)
+        axes.plot(np.arange(1.0, m + 1), energy.of(path.losses), "o", ms=3.5, color=ink())
     else:
         style.bar(axes, colours, "step", above=True)
     axes.set(xlim=(0, max(1, m)))
@@ -111,7 +111,7 @@ def _draw_darkening(axes: Axes, path: LoadPath, x: Array, y: Array) -> ScalarMap
 def _mark_points(axes: Axes, x: Array, y: Array) -> None:
     """Mark points with dots and numbers, if there are few; close ones share their label."""
     if len(x) <= MOST_DOTS:
-        axes.plot(x, y, "o", ms=3.5, color=SMOOTH, clip_on=False, zorder=3)
+        axes.plot(x, y, "o", ms=3.5, color=ink(), clip_on=False, zorder=3)
     if len(x) > MOST_NUMBERS:
         return
     inches = 0.75 * np.array(axes.bbox.size) / axes.figure.dpi  # about those after layout
@@ -130,7 +130,7 @@ def _mark_points(axes: Axes, x: Array, y: Array) -> None:
         best = next((k for k, gap in enumerate(clear) if gap > 0.11), int(np.argmax(clear)))
         taken.append(places[best])
         offset = tuple((places[best] - spots[i]) * 72.0)
-        look = {"ha": "center", "va": "center", "path_effects": style.HALO}
+        look = {"ha": "center", "va": "center", "path_effects": style.halo()}
         style.note(axes, text, (x[i], y[i]), offset, **look)
 
 

@@ -15,7 +15,7 @@ from convexrough.contact import Contact
 from convexrough.plots import style
 from convexrough.plots.asperity_map import CROWDED, draw_values
 from convexrough.plots.notebook import Figure, Figures, no_contact, panels
-from convexrough.plots.style import DOUBLE, ROUGH, SINGLE, SMOOTH, UNSURE, Scale
+from convexrough.plots.style import DOUBLE, ROUGH, SINGLE, UNSURE, Scale, ink
 from convexrough.sphere import hertz
 
 #: (81,) abscissae from -1 to 1, dense at both ends so that a semicircle looks smooth.
@@ -127,7 +127,7 @@ def _draw_smooth(axes: Axes, scale: Scale, semi_axes: Sequence[float], s: Array)
     """Draw the smooth contact's pressure at fractions s of each semi-axis."""
     for place, axis in enumerate(semi_axes):
         p = scale.pressure.of(hertz.pressure(s, 1.0, scale.peak))
-        axes.plot(scale.length.of(axis * s), p, "--", lw=1.3, color=SMOOTH,
+        axes.plot(scale.length.of(axis * s), p, "--", lw=1.3, color=ink(),
                   label=f"_{scale.name}" if place else scale.name)  # fmt: skip
 
 
@@ -183,5 +183,5 @@ def _draw_smooth_share(axes: Axes, scale: Scale) -> None:
         return
     s = TOWARDS_RIM[40:]
     share = hertz.pressure(s, 1.0, 150.0 / np.pi) * np.median(areas[whole]) / scale.typical**2
-    axes.plot(scale.length.of(scale.typical) * s, share, "--", lw=1.1, color=SMOOTH,
+    axes.plot(scale.length.of(scale.typical) * s, share, "--", lw=1.1, color=ink(),
               label="smooth $p(r)$ × cell area")  # fmt: skip

@@ -15,7 +15,7 @@ from convexrough.friction.shear import ShearState
 from convexrough.plots import asperity_map as maps
 from convexrough.plots import style
 from convexrough.plots.notebook import Figures, no_contact, one_contact
-from convexrough.plots.style import DASHED, DOTTED, FAINT, SMOOTH, Scale
+from convexrough.plots.style import DASHED, DOTTED, FAINT, Scale, ink
 from convexrough.scene.rings import evenly_chosen
 from convexrough.vector_shear.state import VectorShearState
 
@@ -87,7 +87,7 @@ def draw_state(axes: Axes, state: State, scale: Scale) -> None:
     unsure = scale.points[style.doubtful(state)]
     if len(unsure):
         size = float(np.clip(60.0 / np.sqrt(len(unsure)), 1.0, 4.0))
-        axes.plot(*scale.length.of(unsure).T, "x", ms=size, mew=0.8, color=SMOOTH,
+        axes.plot(*scale.length.of(unsure).T, "x", ms=size, mew=0.8, color=ink(),
                   label="_undecided")  # fmt: skip
 
 
@@ -99,7 +99,7 @@ def legend_handles(states: Sequence[State], scale: Scale) -> list[Artist]:
     if "partial" in occur:
         marks.insert(0, style.disc_handle(maps.STICK, "stick disc"))
     if any(style.doubtful(state).any() for state in states):
-        marks.append(Line2D([], [], ls="", marker="x", ms=4, color=SMOOTH, label="undecided"))
+        marks.append(Line2D([], [], ls="", marker="x", ms=4, color=ink(), label="undecided"))
     if (loads == 0).any() and np.count_nonzero(loads) < maps.CROWDED:
         marks.append(Line2D([], [], ls="", marker="o", ms=2, mew=0, color=FAINT, label="open"))
     outlines = {"contact": DASHED}
@@ -107,5 +107,5 @@ def legend_handles(states: Sequence[State], scale: Scale) -> list[Artist]:
         outlines["stick"] = DOTTED
     for what, dashes in outlines.items() if scale.sphere else ():
         said = f"{scale.name}: {what}"
-        marks.append(Line2D([], [], ls=dashes, lw=0.9, color=SMOOTH, label=said))
+        marks.append(Line2D([], [], ls=dashes, lw=0.9, color=ink(), label=said))
     return marks

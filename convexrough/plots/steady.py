@@ -19,7 +19,7 @@ from convexrough.friction.phases import PhaseLosses
 from convexrough.plots import style
 from convexrough.plots.asperity_map import draw_map, status_handles, status_layers
 from convexrough.plots.notebook import Figure, Figures, panels
-from convexrough.plots.style import DASHED, DOUBLE, FAINT, ROUGH, SMOOTH, TICK, UNSURE, Scale
+from convexrough.plots.style import DASHED, DOUBLE, FAINT, ROUGH, TICK, UNSURE, Scale, ink
 
 #: Losses are drawn for at most this many factors (sizes of elliptic paths), the largest ones.
 MOST_FACTORS = 5
@@ -81,8 +81,9 @@ def draw_losses(axes: Axes, found: PhaseLosses) -> None:
         turns = np.degrees(found.phases[those])
         rough, smooth = (unit.of(each / cubes)[those] for each in (found.losses, found.smooth))
         axes.plot(turns, rough, ".", color=shade, lw=1.5, ls=pattern, label=f"{size:g}")
-        axes.plot(turns, smooth, color=SMOOTH, lw=0.7, ls=pattern)
-    axes.plot([], [], color=SMOOTH, lw=0.7, label="smooth sphere")
+        dot = "." if len(turns) == 1 else ""  # a line of one point is invisible
+        axes.plot(turns, smooth, dot, color=ink(), lw=0.7, ls=pattern)
+    axes.plot([], [], color=ink(), lw=0.7, label="smooth sphere")
     style.legend(axes, "below", ncols=3, title="factor", title_fontsize=TICK)
     axes.set_ylim(bottom=0.0)
     style.label(axes, "phase [°]  (90: P and Q in phase)", unit.label(r"W\,/\,\mathrm{factor}^3"))
@@ -125,7 +126,7 @@ def draw_closed(axes: Axes, found: Cycle) -> None:
 def label_plane(axes: Axes, most: float, force_unit: str = "") -> style.Measure:
     """Label both axes and draw |T| = P (gross sliding). Returns the measure of both axes."""
     unit = style.measure(most, force_unit, "P_m")
-    _draw_cross(axes, unit, most, color=SMOOTH, lw=0.7)
+    _draw_cross(axes, unit, most, color=ink(), lw=0.7)
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(style.round_ticks(5))  # does not depend on the layout
     T = "T = Q/f" if unit.said and not unit.symbol else "T"

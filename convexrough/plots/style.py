@@ -18,8 +18,9 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
+from matplotlib.colors import to_rgb
 from matplotlib.lines import Line2D
-from matplotlib.patheffects import withStroke
+from matplotlib.patheffects import AbstractPathEffect, withStroke
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
@@ -36,7 +37,6 @@ SINGLE, DOUBLE = 3.5, 7.0  # inches: one and two columns of a journal
 COLOURS = "viridis_r"  # darkens steadily towards the peak, so that it also reads in grey
 ROUGH, UNSURE = "#2b5c8a", "#c1440e"
 SMOOTH, FAINT = "0.15", "0.65"  # greys
-HALO = (withStroke(linewidth=2.0, foreground="white"),)  # of texts on curves
 DASHED, DOTTED = (0, (4, 2.5)), (0, (1, 1.5))
 
 #: Options of the legends of axes, and of those of figures ("outside" all axes), by their places.
@@ -67,12 +67,24 @@ def title(axes: Axes, text: str, loc: Literal["left", "center"] = "left") -> Non
     axes.set_title(text, fontsize=TICK, loc=loc)
 
 
+def ink() -> Any:
+    """The colour of lines: `SMOOTH`, or in dark styles that of labels."""
+    dark = np.mean(to_rgb(matplotlib.rcParams["axes.facecolor"])) < 0.4
+    return matplotlib.rcParams["axes.labelcolor"] if dark else SMOOTH
+
+
+def halo() -> tuple[AbstractPathEffect, ...]:
+    """The path effects of texts on curves."""
+    return (withStroke(linewidth=2.0, foreground=matplotlib.rcParams["axes.facecolor"]),)
+
+
 def bar(axes: Axes, mapped: ScalarMappable, name: str, *, above: bool = False) -> None:
     """A colour bar, added to the right of the axes, with its name above it or along it."""
     found = axes.figure.colorbar(mapped, ax=axes, aspect=28, pad=0.02)
     label(found.ax, "", "" if above else name)
     if above:
-        title(found.ax, name, "center")
+        # Centred, a long name would leave the figure; 2.3 widths are at most where ticks end.
+        found.ax.set_title(name, fontsize=TICK, loc="right", x=2.3)
 
 
 def legend(where: Any, place: str, **more: Any) -> None:
@@ -98,7 +110,7 @@ def note(axes: Axes, text: str, place: Any, offset: Any, **look: Any) -> None:
 def write_beside(axes: Axes, text: str, place: Any) -> None:
     """Write a small text next to a place, readable on any background."""
     box = dict(boxstyle="round,pad=0.15", fc="white", ec="none", alpha=0.85)
-    note(axes, text, place, (6, 6), fontsize=TICK - 1, bbox=box, zorder=5)
+    note(axes, text, place, (6, 6), fontsize=TICK - 1, color="black", bbox=box, zorder=5)
 
 
 def say_nothing(axes: Axes, why: str = "no contact") -> None:

@@ -14,7 +14,7 @@ from convexrough.contact import Contact
 from convexrough.plots import style
 from convexrough.plots.asperity_map import Layer, draw_discs, draw_map, draw_outline, even_radius
 from convexrough.plots.notebook import Figure, Figures, panels
-from convexrough.plots.style import DASHED, FAINT, ROUGH, SINGLE, SMOOTH, TICK, UNSURE, Scale
+from convexrough.plots.style import DASHED, FAINT, ROUGH, SINGLE, TICK, UNSURE, Scale, ink
 from convexrough.surface.provability import OVERLAP, TOO_FAR, Provability, crowded
 from convexrough.surface.summits import Summits
 from convexrough.surface.surface import Surface
@@ -91,7 +91,7 @@ def draw_summit_map(axes: Axes, summits: Summits) -> None:
 
 def draw_provability(axes: Axes, curve: Provability) -> None:
     """Draw the number of touching summits against the pruning; marks show what is proved."""
-    axes.plot(curve.prune, curve.summits, "--", lw=1.1, color=SMOOTH, label="summits")
+    axes.plot(curve.prune, curve.summits, "--", lw=1.1, color=ink(), label="summits")
     # A logarithmic axis cannot show 0.
     _draw_by_scope(axes, curve, np.where(curve.contacts > 0, curve.contacts, np.nan), "contacts")
     axes.set_yscale("log")
@@ -123,7 +123,7 @@ def _provability_figure(curve: Provability, chosen: float, unit: str) -> Figure:
     until = float(curve.prune[-1]) if np.isnan(first) else first
     for axes in (upper, middle, lower):
         axes.axvspan(0.0, until, color="0.92", lw=0.0, zorder=0)
-        axes.axvline(chosen, color=SMOOTH, lw=0.9, ls=":")
+        axes.axvline(chosen, color=ink(), lw=0.9, ls=":")
     met = "at no pruning" if np.isnan(first) else f"from {100 * first:.3g} %"
     tallest = curve.heights[-1] / curve.prune[-1] if curve.prune[-1] else 0.0
     size = f"   ($Sz$ = {style.quantity(float(tallest), unit)})" if tallest else ""
@@ -157,7 +157,7 @@ def _map(surface: Surface, summits: Summits, contact: Contact | None) -> Figure:
         edge = _draw_contacts(axes, scale, length)
         handles = [style.disc_handle(UNSURE, f"contacts ({np.count_nonzero(contact.loads):,})")]
         if scale.axes:
-            handles.append(Line2D([], [], ls=DASHED, lw=0.9, color=SMOOTH, label="smooth contact"))
+            handles.append(Line2D([], [], ls=DASHED, lw=0.9, color=ink(), label="smooth contact"))
         positions = positions[np.abs(positions).max(axis=1) <= edge]
         if len(positions) < len(summits):
             shown = f"{len(positions):,} of {shown}"
@@ -200,7 +200,7 @@ def _histograms(surface: Surface, maxima: Summits, summits: Summits) -> Figure:
         z = np.linspace(edges[0], edges[-1], 200)
         normal = np.exp(-(((z - mean) / spread) ** 2) / 2) / (spread * np.sqrt(2 * np.pi))
         expected = moments.density * summits.origin.area * (edges[1] - edges[0])
-        left.plot(z, expected * normal, "--", lw=1.1, color=SMOOTH, label="by spectral moments")
+        left.plot(z, expected * normal, "--", lw=1.1, color=ink(), label="by spectral moments")
     left.xaxis.set_major_locator(style.round_ticks(4))
     style.label(left, unit.short(r"\mathrm{height}"), "summits")
 
@@ -208,7 +208,7 @@ def _histograms(surface: Surface, maxima: Summits, summits: Summits) -> Figure:
     edges = 10 ** _bins(np.log10(unit.of(maxima.tip_radii)))
     _draw_both(middle, edges, *(unit.of(each.tip_radii) for each in (maxima, summits)))
     middle.set_xscale("log")
-    middle.axvline(unit.of(1 / moments.mean_curvature), color=SMOOTH, ls="--", lw=1.1)
+    middle.axvline(unit.of(1 / moments.mean_curvature), color=ink(), ls="--", lw=1.1)
     span = edges[-1] / edges[0]
     powers = LogLocator(subs=(1.0,) if span > 50 else (1.0, 3.0), numticks=5)
     middle.xaxis.set_major_locator(powers if span > 10 else style.round_ticks(4))
@@ -226,7 +226,7 @@ def _histograms(surface: Surface, maxima: Summits, summits: Summits) -> Figure:
 
 def _draw_both(axes: Axes, edges: Array, maxima: Array, summits: Array) -> None:
     bins = edges.tolist()
-    axes.hist(maxima, bins, histtype="step", lw=1.0, color=SMOOTH, label="all maxima")
+    axes.hist(maxima, bins, histtype="step", lw=1.0, color=ink(), label="all maxima")
     axes.hist(summits, bins, color=ROUGH, alpha=0.75, label="summits left by pruning")
 
 

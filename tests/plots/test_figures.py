@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from figure_checks import discs, fits, texts
 from friction_scenes import LARGEST, ONE, PAPER, follow
+from matplotlib import style
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from numpy.testing import assert_allclose
@@ -60,6 +61,7 @@ def past(name: str, shares: Any) -> cr.LoadPath:
 @pytest.mark.parametrize("name", CASES)
 def test_fit_to_print(name: str) -> None:
     pressed = contact(f"{name} in units")
+    fits(pressed.plot().figure)
     for figure in plots.press_figures(pressed).values():
         fits(figure)
         for axes in figure.axes[:2] if pressed.loads.any() else ():
@@ -234,6 +236,26 @@ def test_unknown_wear_is_grey() -> None:
     figure = nothing.plot().figure
     assert len(figure.axes) == 1  # no colour bar
     assert [text.get_text() for text in texts(figure)].count("not known") == 2
+
+
+def test_dark_styles_stay_legible() -> None:
+    pressed = contact("paper")
+    done = past("paper", [0.6, -0.2])
+    with style.context("dark_background"):
+        path = plots.path_figures(done)["history"].axes[0]
+        verdict = plots.verdict_figures(cr.verify(pressed.scene, 0 * pressed.loads, load=1.0))
+        dashed = pressed.plot().patches[0]
+    assert path.texts[0].get_color() == "white"
+    assert path.texts[0].get_path_effects()[0]._gc["foreground"] == "black"
+    assert verdict["verdict"].axes[0].texts[0].get_color() == "black"  # in a white box
+    assert dashed.get_edgecolor() == to_rgba("white")
+
+
+def test_one_phase_is_a_dot() -> None:
+    P = LARGEST["paper"]
+    found = cr.phase_losses(PAPER, load=P, load_amplitude=0.2 * P, force_amplitude=0.1 * P,
+                            phases=[1.5], chords=6)  # fmt: skip
+    assert [line.get_marker() for line in found.plot().lines[:2]] == [".", "."]
 
 
 def test_the_colours_and_the_profile_show_the_pressure() -> None:
