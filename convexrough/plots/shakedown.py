@@ -13,7 +13,7 @@ from convexrough.melan.shakedown import Shakedown
 from convexrough.plots import style
 from convexrough.plots.asperity_map import Layer, draw_map, even_radius
 from convexrough.plots.notebook import Figure, Figures, panels
-from convexrough.plots.style import COLOURS, DASHED, FAINT, SINGLE, UNSURE, ink
+from convexrough.plots.style import COLOURS, DASHED, FAINT, SINGLE, SMOOTH, UNSURE
 
 #: Number of points of the map along each axis.
 FINE = 240
@@ -111,7 +111,7 @@ def _map(found: Shakedown) -> Figure:
     if varies:
         at, across_label = unit_p * found.factor, "load amplitude / $P_0$"
         reach = np.array([0.0, 1.0 / max(unit_p, unit_t)])
-        axes.plot(unit_p * reach, unit_t * reach, color=ink(), lw=0.8, ls=DASHED)
+        axes.plot(unit_p * reach, unit_t * reach, color=SMOOTH, lw=0.8, ls=DASHED)
     axes.plot([at], [unit_t * found.factor], "o", ms=5, mfc="white", mec=UNSURE, mew=1.4)
     axes.set(xlim=(0, 1), ylim=(0, 1), aspect="equal")
     style.bar(axes, filled, "asperities that keep sliding, or open")

@@ -88,7 +88,7 @@ def draw_state(axes: Axes, state: State, scale: Scale) -> None:
     if len(unsure):
         size = float(np.clip(60.0 / np.sqrt(len(unsure)), 1.0, 4.0))
         axes.plot(*scale.length.of(unsure).T, "x", ms=size, mew=0.8, color=ink(),
-                  label="_undecided")  # fmt: skip
+                  path_effects=style.halo(), label="_undecided")  # fmt: skip
 
 
 def legend_handles(states: Sequence[State], scale: Scale) -> list[Artist]:

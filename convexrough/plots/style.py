@@ -121,7 +121,8 @@ def say_nothing(axes: Axes, why: str = "no contact") -> None:
 
 def write_inside(axes: Axes, why: str) -> None:
     """Write a text into the middle of a panel."""
-    axes.text(0.5, 0.5, why, transform=axes.transAxes, fontsize=LABEL, ha="center", va="center")
+    axes.text(0.5, 0.5, why, transform=axes.transAxes, fontsize=LABEL, ha="center", va="center",
+              path_effects=halo())  # fmt: skip
 
 
 def not_proved(state: Any) -> str:
