@@ -52,16 +52,22 @@ def each(work: Callable[[Part], object], parts: Iterable[Part], threads: int) ->
 def both(first: Callable[[], One], second: Callable[[], Other]) -> tuple[One, Other]:
     """The results of first() and second(), which run at the same time."""
     other = _submitted(second)
-    found = first()
-    return found, second() if other is None or other.cancel() else other.result()
+    try:
+        found = first()
+    finally:
+        started = [other] if other and not other.cancel() else []
+        wait(started)
+    return found, started[0].result() if started else second()
 
 
 def _submitted(work: Callable[[], One]) -> Future[One] | None:
-    """The future of work() in another thread; None if the process ends and no thread can start."""
+    """The future of work() in another thread; None where the process ends."""
     try:
         return _pool().submit(work)
-    except RuntimeError:
-        return None
+    except RuntimeError as error:
+        if "shutdown" in str(error):
+            return None
+        raise  # the system refuses another thread
 
 
 @cache
@@ -106,7 +112,7 @@ def one_thread() -> Iterator[None]:
 @cache
 def _libraries() -> Any:
     """The libraries of linear algebra, which take a millisecond to find."""
-    import scipy.linalg  # noqa: F401  limits apply only to loaded libraries
+    import scipy.linalg  # noqa: F401  limits apply only to libraries loaded before the first call
     from threadpoolctl import ThreadpoolController
 
     return ThreadpoolController()

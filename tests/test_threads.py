@@ -34,10 +34,13 @@ def test_callers_in_several_threads_do_not_disturb_each_other() -> None:
         with threads.one_thread():
             return squares(), limits_of_threads() if k % 100 == 0 else {1}
 
+    before = sys.getswitchinterval()
     sys.setswitchinterval(1e-6)  # threads take turns at nearly every line
-    with ThreadPoolExecutor(2) as pool:
-        found = list(pool.map(limited, range(1000)))
-    sys.setswitchinterval(0.005)
+    try:
+        with ThreadPoolExecutor(2) as pool:
+            found = list(pool.map(limited, range(1000)))
+    finally:
+        sys.setswitchinterval(before)
     assert found == 1000 * [([0, 1, 4], {1})]
     assert limits_of_threads() == limits
 
@@ -56,6 +59,10 @@ def test_an_error_of_any_thread_is_raised_when_no_thread_works_any_more(fails: i
     with pytest.raises(ZeroDivisionError):
         threads.each(work, [0, 9, 1, 2, 3], 2)
     assert len(ended) == 4
+    ended.clear()
+    with pytest.raises(ZeroDivisionError):
+        threads.both(lambda: work(0), lambda: work(9))
+    assert len(ended) == 1
 
 
 def met() -> list[int]:
@@ -64,7 +71,7 @@ def met() -> list[int]:
     return sorted(threads.both(meeting.wait, meeting.wait))
 
 
-def test_both_run_at_once_even_in_a_thread_of_the_pool() -> None:
+def test_both_run_at_once_and_may_be_nested() -> None:
     assert met() == [0, 1]
     assert threads.both(lambda: 1, lambda: threads.both(lambda: 2, lambda: 3)) == (1, (2, 3))
 

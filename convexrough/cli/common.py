@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, redirect_stdout
@@ -177,8 +178,9 @@ def progress(message: str) -> Iterator[None]:
 
     with ExitStack() as stack:
         stack.enter_context(logged(lambda record: say_aside("note", record.getMessage()), NOTE))
-        if sys.stderr is not None:  # it is None where a shell closed it
-            stack.enter_context(redirect_stdout(sys.stderr))
+        # Standard error is None where a shell closed it.
+        aside = sys.stderr or stack.enter_context(open(os.devnull, "w"))
+        stack.enter_context(redirect_stdout(aside))
         if sys.stderr is not None and sys.stderr.isatty():
             from rich.console import Console
 

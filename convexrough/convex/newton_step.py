@@ -16,6 +16,7 @@ instead, with the unknown W y.
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
@@ -76,7 +77,7 @@ def correct(
         if direct:
             step = _factorise(influence, extra, touching, root, defect, balanced)
         else:
-            with threads.one_thread():  # products with A use several themselves
+            with threads.one_thread() if not influence.stored else nullcontext():
                 step = _in_two_parts(influence, extra, root, defect, balanced, tolerance)
         if step is not None:
             return step

@@ -22,9 +22,9 @@ from convexrough.roundoff import ROUNDOFF
 PASS_ROUNDOFFS = {2: 6, 3: 14, 5: 18, 7: 24, 11: 35}
 
 #: Columns are transformed in groups that have ROW bytes in each row. Rows of a kernel are computed
-#: in groups of about LAID_OUT numbers per thread, and rows of a field are transformed in groups of
-#: about IN_ROWS numbers. All groups fit in the cache.
-ROW, LAID_OUT, IN_ROWS = 512, 2**15, 2**16
+#: in groups of about LAID_OUT numbers, and rows of a field are transformed in groups of about
+#: IN_ROWS numbers. All groups fit in the cache.
+ROW, LAID_OUT, IN_ROWS = 512, 2**16, 2**16
 
 #: A function of differences i of row numbers and j of column numbers of two sites, and of squared
 #: distances (len(i), len(j)) [spacing^2]. It returns values (len(i), len(j)) of each kernel.
@@ -140,8 +140,7 @@ class SiteBox:
             threads.each(transform, in_blocks(half), self.workers)
             return spectrum
 
-        some = max(1, LAID_OUT * self.workers // columns)  # with more threads, fewer calls
-        threads.each(along_rows, threads.chunks(last, some), self.workers)
+        threads.each(along_rows, threads.chunks(last, max(1, LAID_OUT // columns)), self.workers)
         norms = np.sqrt(squares.sum(axis=1)).tolist()
         return [Kernel(along_columns(halves.pop(0)), norm) for norm in norms]
 

@@ -84,7 +84,7 @@ class NormalProblem:
         return len(self.candidates)
 
     def one_thread(self) -> AbstractContextManager[object]:
-        """`threads.one_where` products with A use several threads themselves."""
+        """`threads.one_thread` where products with A use several threads themselves."""
         numbers = 4 if self.influence.stored else 100  # about that many for each asperity
         return threads.one_where(numbers * len(self))
 

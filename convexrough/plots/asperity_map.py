@@ -159,10 +159,10 @@ def draw_values(
         for k, (radius, each) in enumerate(zip(sizes, np.atleast_2d(values), strict=True))
     ]
     draw_map(axes, scale.points, scale.length, layers, outline=scale.axes)
-    if np.isfinite(values).any():
-        style.bar(axes, colours, name, above=not signed)
-    else:
+    if (drawn := sizes > 0).any() and not (np.isfinite(values) & drawn).any():
         style.write_inside(axes, "not known")
+    else:
+        style.bar(axes, colours, name, above=not signed)
     return colours
 
 

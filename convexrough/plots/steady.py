@@ -82,7 +82,7 @@ def draw_losses(axes: Axes, found: PhaseLosses) -> None:
         rough, smooth = (unit.of(each / cubes)[those] for each in (found.losses, found.smooth))
         axes.plot(turns, rough, ".", color=shade, lw=1.5, ls=pattern, label=f"{size:g}")
         dot = "." if len(turns) == 1 else ""  # a line of one point is invisible
-        axes.plot(turns, smooth, dot, color=ink(), lw=0.7, ls=pattern)
+        axes.plot(turns, smooth, marker=dot, color=ink(), lw=0.7, ls=pattern)
     axes.plot([], [], color=ink(), lw=0.7, label="smooth sphere")
     style.legend(axes, "below", ncols=3, title="factor", title_fontsize=TICK)
     axes.set_ylim(bottom=0.0)

@@ -204,8 +204,8 @@ def _roughness(problem: NormalProblem) -> float:
     """[length] standard deviation of heights about their means over rings about the axis."""
     some = problem.candidates[:: max(1, len(problem) // SAMPLE)]
     heights = problem.scene.asperities.heights[some]
-    squares = (problem.scene.asperities.positions.take(some, axis=0) ** 2).sum(axis=1)
-    ring = np.minimum(squares * (RINGS / squares.max()), RINGS - 1).astype(np.intp)
+    distances = np.hypot(*problem.scene.asperities.positions.take(some, axis=0).T)
+    ring = np.minimum(RINGS * (distances / distances.max()) ** 2, RINGS - 1).astype(np.intp)
     means = np.bincount(ring, heights) / np.maximum(np.bincount(ring), 1)
     return float((heights - means[ring]).std())
 
