@@ -21,9 +21,6 @@ from convexrough.arrays import Array, Number, frozen
 #: from float64).
 PAIR_ROUNDOFF = 2.0**-98
 
-#: Largest number of terms that are summed at once.
-MANY = 2**18
-
 #: Number of elements that are processed together, so that they fit in a cache.
 CHUNK = 2**14
 
@@ -126,9 +123,9 @@ class Pair(NamedTuple):
         """
         high, low = np.asarray(self.high), np.asarray(self.low)
         n = high.shape[-1]
-        if n > MANY:
-            starts = range(0, n, MANY)
-            parts = [Pair(high, low).at(np.s_[..., s : s + MANY]).total() for s in starts]
+        if n > CHUNK:
+            starts = range(0, n, CHUNK)
+            parts = [Pair(high, low).at(np.s_[..., s : s + CHUNK]).total() for s in starts]
             return Pair(*(np.stack(part, axis=-1) for part in zip(*parts, strict=True))).total()
         bits = min(51, 53 - n.bit_length())
         most = np.abs(high).max(axis=-1, initial=0.0, keepdims=True)

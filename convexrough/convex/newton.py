@@ -82,10 +82,9 @@ def solve(
 
     The method ends if  residual <= tolerance * scale.  Once  residual <= accurate * scale,  it also
     ends if the defect is below its `noise`, or if a step does not halve the residual; in this last
-    case the better of the states before and after the step is returned. If the caller makes one
-    linear correction, it gives the 2-norm `linear` of the defect that this may leave: the method
-    then also ends if the next step is expected to leave no more. After `most` steps the larger of
-    `tolerance` and `accurate` suffices.
+    case the better of the states before and after the step is returned. It also ends if the 2-norm
+    of the defect is at most `linear`: if the caller corrects the result. After `most` steps the
+    larger of `tolerance` and `accurate` suffices.
     """
     before = np.inf  # the 2-norm of the last defect
     for step in range(1, most + 1):
@@ -96,7 +95,7 @@ def solve(
         if done or (near and size <= state.noise):
             return state, step - 1
         expected = (size / before) ** 2 if before < np.inf else 1.0
-        if expected * size <= linear:
+        if size <= linear:
             return state, step - 1
         forcing = min(MOST_LEFT, expected)
         enough = max(state.noise / size, tolerance * state.scale / state.residual)

@@ -98,9 +98,9 @@ def approach_bound(
 def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -> float:
     """Upper bound [length] on the approach at every solution of total `load` [force].
 
-    It is `approach_bound` with rates of the loads `smooth_loads` as weights. Where contact discs
-    under these would reach their nearest neighbours, the loads are reduced, as the bound would be
-    useless.
+    It is `approach_bound` with rates dP/dL at the indentations `smooth_indentations` as
+    weights. Where contact discs would reach their nearest neighbours, the indentations are reduced,
+    as the bound would be useless.
     """
     bound, reaches, distances = np.nan, [np.inf], np.hypot(*scene.contact_points.T)
     if scene.curved:
@@ -131,19 +131,19 @@ def _bound_within(
     near = scene.asperities.layout.sorted(~far)
     if len(near) == 0:
         return np.nan
-    weights, least = smooth_loads(scene, load, near)
+    indentation, least = smooth_indentations(scene, load, near)
+    weights = np.maximum(indentation, 0.0)
     one_box = scene.lattice is not None and influence in (None, "lattice")
     every = one_box or len(near) <= FEW_ASPERITIES
     which = np.arange(len(near)) if every else np.flatnonzero(weights)
     sources = couple(scene, near[which], 1.0 / (np.pi * modulus), influence)
     radii = taken(scene.relative_radii, near)
-    coefficients = hertz.local_coefficient(modulus, radii)
     if not one_box:
-        deepest = sources.separations() ** 2 / radii[which]
-        fitting = np.minimum(weights[which], hertz.load(deepest, coefficients[which]))
+        fitting = np.minimum(weights[which], sources.separations() ** 2 / radii[which])
         if fitting.any():
             weights[which] = fitting
-    weights = np.cbrt(weights) / coefficients  # rates dP/dL if all indentations change alike
+    coefficients = hertz.local_coefficient(modulus, radii)
+    weights = np.sqrt(weights / coefficients) / coefficients  # dP/dL if all rise alike
     couplings: list[tuple[Indices, Coupling]] = [(which, sources)]
     if not every:
         others = np.flatnonzero(weights == 0)
@@ -162,17 +162,17 @@ def _bound_within(
     return float(approach_bound(weights, displacement, coefficients, offsets, load))
 
 
-def smooth_loads(scene: Scene, load: float, which: Indices) -> tuple[Array, float]:
-    """Estimated loads of the asperities `which`, with the total `load`, and a number -tau [length].
+def smooth_indentations(scene: Scene, load: float, which: Indices) -> tuple[Array, float]:
+    """Estimated indentations [length] of the asperities `which`, and a number -tau [length].
 
-    They follow by Hertz's law from the indentations `lowered` + tau. If others are lower than -tau,
-    their loads would be 0.
+    They are `lowered` + tau, with the tau by which loads by Hertz's law have the total `load`. If
+    others are lower than -tau, they would be open.
     """
     offsets = lowered(scene, load, which)
     radii = taken(scene.relative_radii, which)
     coefficients = hertz.local_coefficient(scene.material.contact_modulus, radii)
     indentation = shifted_to_load(offsets, coefficients, load)
-    return np.asarray(hertz.load(indentation, coefficients)), float(offsets[0] - indentation[0])
+    return indentation, float(offsets[0] - indentation[0])
 
 
 def lowered(scene: Scene, load: float, which: Indices) -> Array:
@@ -204,8 +204,8 @@ def all_that_could_touch(
     while True:
         reached = WIDER * within
         grown = scene_within(reached)
-        weights, _ = smooth_loads(grown, load, np.arange(len(grown)))
-        if weights[grown.asperities.distances > within].any():
+        indentation, _ = smooth_indentations(grown, load, np.arange(len(grown)))
+        if (indentation[grown.asperities.distances > within] > 0).any():
             reached, grown = within, scene_within(within)
         bound = highest_approach(grown, load)
         needed = farthest(bound)

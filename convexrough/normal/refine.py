@@ -105,7 +105,7 @@ def trial(problem: NormalProblem, loads: Pair, missing: Ball, product: Ball) -> 
         gap = residual(data.coefficients, exact, product, data.offsets, problem.control)
         return Trial(problem, loads, product, gap, problem.control, missing)
     above = residual(data.coefficients, exact, product, data.offsets, Ball.exact(0.0))
-    weights = np.cbrt(loads.high)
+    weights = np.sqrt(loads.high)
     total = summed(weights)
     shift = summed(weights * above.value) / total
     rest = summed(weights * ((above.value - shift) + above.mid.low)) / total

@@ -9,6 +9,7 @@ found to be open.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -22,14 +23,14 @@ from convexrough.errors import SolverError
 from convexrough.normal.law import Pressed, on_hertz_pressure
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.refine import Trial, refined, trial_of
-from convexrough.roundoff import ROUNDOFF, SAFETY
+from convexrough.roundoff import SAFETY
 from convexrough.solvers.mean_field import mean_field_indentation
 from convexrough.solvers.solution import Solution
 from convexrough.sphere import hertz
 
-#: Newton's method may end if the expected norm of the defect after the next step is at most this
-#: fraction of the norm of the indentations. Refinement then makes the next correction. A heuristic.
-NEGLIGIBLE = 88 * ROUNDOFF
+#: Newton's method may end if the norm of the defect is at most LINEAR times the square root of that
+#: of the indentations: one correction then leaves the rounding error of a sharp product. Heuristic.
+LINEAR = 3e-10
 
 #: If at most this many asperities could touch, the iteration includes all of them, and the start
 #: uses a product with A. Affects speed only.
@@ -165,7 +166,9 @@ class Newton:
             loads = among_zeros(state.forces, near, len(problem))
             unknown, approach = state.unknown, float(state.at.approach)
             del state  # saves memory
-            trial = trial_of(problem, loads, problem.pressed_product) if refines else None
+            product, trial = problem.pressed_product, None
+            if refines:
+                trial = trial_of(problem, loads, product, roughly=True)
             if len(near) == len(problem):
                 return loads, approach, iterations, trial
             # The iteration left out some asperities: compute the gaps of all.
@@ -189,7 +192,7 @@ class Newton:
         part = problem if len(near) == len(problem) else problem.restricted(near)
         law, left = Pressing(part, float(np.abs(problem.offsets).max())), 0.0
         if early:
-            left = NEGLIGIBLE * float(np.linalg.norm(np.maximum(indentation, 0.0)))
+            left = LINEAR * math.sqrt(np.linalg.norm(np.maximum(indentation, 0.0)))
         try:
             state = law.evaluate(indentation)
             assert state is not None  # an asperity is loaded at the start

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from multiprecision import middle
 
 from convexrough.arithmetic.balls import Ball, residual
-from convexrough.arithmetic.pairs import MANY, Pair, two_sum
+from convexrough.arithmetic.pairs import CHUNK, Pair, two_sum
 
 #: Bits that hold sums and products of any float64 numbers.
 BITS = 4000
@@ -177,7 +177,7 @@ def test_what_is_no_number_is_unknown() -> None:
         assert (bad + 1.0).radius[0] == INF
 
 
-@pytest.mark.parametrize("count", [1000, MANY + 3])
+@pytest.mark.parametrize("count", [1000, CHUNK + 3])
 def test_long_sums(count: int) -> None:
     """Of sizes that differ; and of more numbers than are added at once."""
     rng = np.random.default_rng(0)
