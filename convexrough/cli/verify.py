@@ -164,8 +164,7 @@ def verify(
         stack.enter_context(_reported(junit, names))
         with common.progress(f"reading {scene}"):
             file = read_scene(scene)
-        shared = ("x", "y") if shear is not None else ()
-        manner = _manner(units=file.scene.units, convert=file.convert, shared=shared, **how)
+        manner = _manner(units=file.scene.units, convert=file.convert, **how)
         read = [read_loads(loads, file.scene, manner)]
         read += [read_shear_forces(shear, file.scene, manner)] if shear is not None else []
         if unread := manner.scales.keys() - {name for each in read for name in each.numbers}:

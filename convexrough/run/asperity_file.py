@@ -8,21 +8,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from convexrough import checks
-from convexrough.arrays import Array
 from convexrough.errors import InputError, blamed_on
 from convexrough.progress import LOGGER, NOTE
 from convexrough.scene.asperities import Asperities
 from convexrough.tabular.roles import AS_IT_IS, Reading, columns_key, is_index, shortened
-from convexrough.tabular.table import read_table
+from convexrough.tabular.table import read_table, summary_in_last
 from convexrough.tabular.units import bare, parsed
 
 #: Names of columns with results, which are ignored in a table of asperities.
 RESULTS = ("load", "contact_radius", "mean_pressure", "gap", "load_error", "force", "pressure",
            "area", "contact")  # fmt: skip
 
-#: Largest number of columns that a message names; largest difference of a last row from the means
-#: or sums of the other rows, over the range of each column, if it contains those.
-MOST_NAMED, ROUNDED = 5, 1e-3
+#: Largest number of columns that a message names.
+MOST_NAMED = 5
 
 
 def read_summits(
@@ -44,7 +42,7 @@ def read_summits(
     ]
     some = ", ".join(unread[:MOST_NAMED]) + ", ..." * (len(unread) > MOST_NAMED)
     if "height" not in columns and unread:  # one of them may contain heights
-        named = f"; {columns_key(how.columns, ['height'], unread)}, or no such column"
+        named = f"; {columns_key(how.columns, ['height'])}, or no such column"
         if "depth" in unread[0].lower():
             named = ", which grows towards the sphere: write depths as negative heights"
         raise InputError("columns", found=f"{some}, but no height",
@@ -59,7 +57,9 @@ def read_summits(
             found = f"{cells[0]:g}, {cells[1]:g}, ..."
             expected = "the rows in increasing order, or no such column"
             raise InputError(f"column {name}", found=found, expected=expected, where=str(path))
-    if what := _summary_in_last_row([*columns.values()]):
+    own = [*columns.values()][2:]  # without, it may be the asperity in the middle of an array
+    regular = len(table.rows) < 4 or not own or any(np.ptp(each[:-1]) == 0 for each in own)
+    if what := "" if regular else summary_in_last(np.column_stack([*columns.values()])):
         raise InputError(table.rows[-1], found=f"the {what} of the other rows",
                          expected="an asperity: remove this row", where=str(path))  # fmt: skip
     given = columns.get("tip_radius")
@@ -67,7 +67,7 @@ def read_summits(
         found = "neither" if given is None else "both"
         expected = "either a column tip_radius or the key tip_radius in the scene file"
         if given is None and unread:
-            key = columns_key(how.columns, ["tip_radius"], unread)
+            key = columns_key(how.columns, ["tip_radius"])
             expected += f"; not used: {some}; {key} names radii (half of diameters)"
         raise InputError("tip radii", found=found, expected=expected, where=str(path))
     positions = np.column_stack((columns["x"], columns["y"]))
@@ -76,18 +76,9 @@ def read_summits(
     notes = [table.style] if '" of ' in table.style else []  # one of several sheets
     if unread and "elliptic_load" not in unread:  # a column of summits.csv
         notes.append(f"not used: {some}")
+    if table.comments:
+        notes.append(f"comments not used: {shortened(' '.join(table.comments))}")
     if notes:
         LOGGER.log(NOTE, f"{path}: {', '.join(notes)}")
     with blamed_on(f"{path} ({table.rows[0]} holds asperity 0)"):
         return Asperities(positions, radii, columns.get("height", 0.0))
-
-
-def _summary_in_last_row(columns: list[Array]) -> str:
-    """ "means" or "sums" if the last row contains those of the rows above; else ""."""
-    own = columns[2:]
-    if len(columns[0]) < 4 or not own or any(np.ptp(each[:-1]) == 0 for each in own):
-        return ""  # perhaps an asperity in the middle of a regular array
-    for what, of in (("means", np.mean), ("sums", np.sum)):
-        if all(abs(each[-1] - of(each[:-1])) <= ROUNDED * np.ptp(each[:-1]) for each in columns):
-            return what
-    return ""

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-import re
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 from warnings import catch_warnings
 
 import numpy as np
@@ -18,13 +17,9 @@ from convexrough.tabular.arrays import foreign, named_arrays, parts
 from convexrough.tabular.roles import shortened
 from convexrough.tabular.units import bare, one_unit, unit
 
-#: Names of arrays of an .npz or .mat file: of the heights; of the pixel and the units; and parts of
-#: names of other arrays that probably change the meaning of the heights, which are errors.
+#: Names of arrays of an .npz or .mat file: of the heights; and of what may be beside them.
 HEIGHTS = ("heights", "height", "z")
-STATED = ("pixel", "unit", "height_unit")
-SCALES = re.compile(
-    "unit|scale|factor|multipl|gain|offset|lsb|pixel|spacing|step|resol|calib|^d[xyz]$", re.I
-)
+STATED = ("pixel", "unit", "height_unit", "x", "y")
 
 #: The first bytes of a map by Zygo's MetroPro, whose name ends in .dat.
 METROPRO = b"\x88\x1b\x03"
@@ -50,28 +45,20 @@ class HeightGrid(NamedTuple):
 def arrays_map(path: Path) -> HeightGrid:
     """The map in a .npy, .npz or .mat file."""
     found = {name: np.asarray(values) for name, values in named_arrays(path).items()}
-    named = {name.lower(): values for name, values in found.items()} | found
-    chosen = "" if "" in found else _chosen(found)
-
-    def may_change(name: str, values: NDArray[Any]) -> bool:
-        """True for what may change the meaning of heights: a factor, a mask, coordinates."""
-        alike = values.size in (1, named[chosen].size, *named[chosen].shape)
-        numbers = values.dtype.kind in "biufc" and (alike or values.ndim > 1) and values.size > 0
-        return bool(SCALES.search(name)) or numbers or values.dtype.kind == "O"
-
-    rest = {it: found[it] for it in found if it != chosen and it.lower() not in (*STATED, "x", "y")}
-    others = [name for name, values in rest.items() if may_change(name, values)]
-    if others:
-        expected = f"{', '.join(STATED)}, x, y and no other numbers beside heights, in which nan "
-        expected += "marks holes"
+    named = {name.lower(): values for name, values in found.items()}
+    likely = [name for name in found if bare(name).lower() in HEIGHTS]
+    left = [name for name in found if name.lower() not in STATED]
+    if len(chosen := likely or left) != 1:
+        names = ", ".join(chosen or found) or "none"
+        raise InputError("arrays", found=names, expected='one called "heights"')
+    if others := [name for name in left if name not in chosen]:
+        expected = f"heights and {', '.join(STATED)} alone, with nan in holes"
         raise InputError("arrays", found=shortened(", ".join(others)), expected=expected)
     size = checked_pixel(np.squeeze(named["pixel"])) if "pixel" in named else None
-    said, height_unit = (" ".join(map(str, parts(named.get(name, ())))) for name in STATED[1:])
-    if upwards := one_unit("height_unit", height_unit, unit(chosen)):
-        height_unit = upwards.name
-    texts = [(name, values) for name, values in rest.items() if values.dtype.kind in "US"]
-    comments = tuple(f"{name}: {each}" for name, values in texts for each in parts(values))
-    heights = np.squeeze(_numbers(named[chosen]))
+    said, upwards = (" ".join(map(str, parts(named.get(name, ())))) for name in STATED[1:3])
+    if known := one_unit("height_unit", upwards, unit(chosen[0])):
+        upwards = known.name
+    heights = np.squeeze(_numbers(found[chosen[0]]))
     axes = [np.atleast_1d(np.squeeze(_numbers(named[name]))) for name in "xy" if name in named]
     if len(axes) == 1:
         only = f"only {'x' if 'x' in named else 'y'}"
@@ -82,18 +69,7 @@ def arrays_map(path: Path) -> HeightGrid:
         heights, steps = on_grid(heights, *axes)
         size = size or steps
         refuse_other(size, steps, ROUNDED, "the steps of x and y")
-    return HeightGrid(heights, size, said, height_unit, comments)
-
-
-def _chosen(found: dict[str, NDArray[Any]]) -> str:
-    """The name of the array of heights."""
-    maps = [name for name in found if found[name].ndim == 2 and name.lower() not in ("x", "y")]
-    likely = [name for name in found if bare(name).lower() in HEIGHTS] or maps
-    likely = ["heights"] if "heights" in likely else likely
-    if len(likely) != 1:
-        names = ", ".join(likely or found) or "none"
-        raise InputError("arrays", found=names, expected='one called "heights"')
-    return likely[0]
+    return HeightGrid(heights, size, said, upwards)
 
 
 def _numbers(values: NDArray[np.generic]) -> Array:

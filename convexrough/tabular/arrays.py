@@ -6,7 +6,6 @@ import re
 import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +16,8 @@ from convexrough.errors import ConvexroughError, ExtraError, FileError, file_err
 
 Columns = dict[str, list[Any]]
 
-#: Names of arrays, and words of comments, for factors or offsets; the end of "heights x 1000".
-FACTORS = re.compile(
-    r"(?<![a-z])(scale[ds]?|fa[ck]tors?|multipl[iy]\w*|times|divided|gain|offsets?)(?![a-z])", re.I
-)
-TIMES = re.compile(r"[^\d\s](\s*[*×÷]|\s+[x/])\s*[+-]?[.,]?\d\S*\s*$")
+#: Names of arrays beside columns that could change their meaning.
+SCALES = re.compile(r"unit|(?<![a-z])(scale|fa[ck]tor|multipl|gain|offset)", re.I)
 
 #: Extensions of files of arrays.
 ARRAYS = (".npy", ".npz", ".mat", ".parquet")
@@ -77,8 +73,8 @@ def named_arrays(path: Path) -> dict[str, Any]:
         return arrays
 
 
-def read_arrays(path: Path, known: Sequence[str]) -> tuple[Columns, list[tuple[str, str]]]:
-    """Columns of a file by name or number from 1; place and text of arrays that may state units.
+def read_arrays(path: Path, known: Sequence[str]) -> tuple[Columns, list[str]]:
+    """Columns of a file by name or number from 1; and its texts, as comments.
 
     known : names to read, in lower case; other columns are kept only if they have the same length.
         If no column has one of these names, all columns are read
@@ -100,20 +96,23 @@ def read_arrays(path: Path, known: Sequence[str]) -> tuple[Columns, list[tuple[s
         found = ", ".join(f"{len(columns[name])} numbers in {name}" for name in wanted)
         raise FileError(f"{path}: found {found}, expected as many in each")
     kept = {name: values for name, values in columns.items() if len(values) in lengths}
-    said = list[tuple[str, str]]()
-    for name, value in named.items() if len(named) > 1 else ():
-        neutral, held = 0 if "offset" in name.lower() else 1, parts(value)
-        if FACTORS.search(name) and any(part != neutral for part in held):
-            raise FileError(f"{path}: found {name}, expected columns that need no factor or offset")
-        if name not in kept and any(isinstance(part, str) for part in held):
-            said.append((f"array {name}", f"{name}: {', '.join(map(str, held))}"))
-    return kept, said
+    rest = {
+        name: parts(value) for name, value in named.items() if len(named) > 1 and name not in kept
+    }
+    if scale := next(filter(SCALES.search, rest), ""):
+        expected = "columns that need no unit, factor or offset; name a unit as in load_mN"
+        raise FileError(f"{path}: found {scale}, expected {expected}")
+    texts = {name: " ".join(map(str, held)) for name, held in rest.items()
+             if any(isinstance(part, str) for part in held)}  # fmt: skip
+    return kept, [f"{name}: {text}" for name, text in texts.items()]
 
 
 def parts(value: Any) -> list[Any]:
-    """The numbers and texts in an array."""
+    """The numbers and texts in an array, a list or a structure."""
     if isinstance(value, np.ndarray):
         value = value.tolist()
+    if isinstance(value, dict):
+        value = [*value.values()]
     if isinstance(value, (list, tuple)):
         return [each for part in value for each in parts(part)]
     return [value.decode("utf-8", "replace") if isinstance(value, bytes) else value]
@@ -130,19 +129,13 @@ def _is_table(name: str, values: Any, known: Sequence[str]) -> bool:
 def _of_one_shape(path: Path, arrays: dict[str, NDArray[Any]], known: Sequence[str]) -> Columns:
     """All vectors; or all arrays of one two-dimensional shape, if all `known` arrays have it."""
     shapes = {name: each.shape for name, each in arrays.items() if name.lower() in known}
-    axes = {each.size: name for name, each in arrays.items() if name.lower() in ("x", "y")}
-    wide = [shape for shape in shapes.values() if len(shape) > 1]
-    if wide and len(axes) == 2 == len(wide[0]) and axes.keys() == {*wide[0]}:  # lengths show order
-        names = [axes[size] for size in wide[0]]
-        mesh = np.meshgrid(*(arrays[name] for name in names), indexing="ij")
-        arrays = arrays | dict(zip(names, mesh, strict=True))
-    if wide and (len(shapes) == 1 or {arrays[name].shape for name in shapes} != {wide[0]}):
+    shape = next((shape for shape in shapes.values() if len(shape) > 1), None)
+    if shape and (len(shapes) == 1 or {*shapes.values()} != {shape}):
         found = ", ".join(f"{name} of {' x '.join(map(str, it))}" for name, it in shapes.items())
         expected = "vectors, or matrices x, y (as of meshgrid) and values of one shape"
-        expected += ": vectors x, y do not show what the rows are" * (len({*wide[0]}) == 1)
         raise FileError(f"{path}: found {found} numbers, expected {expected}")
     return {name: each.ravel().tolist() for name, each in arrays.items()
-            if (each.shape == wide[0] if wide else each.ndim == 1)}  # fmt: skip
+            if (each.shape == shape if shape else each.ndim == 1)}  # fmt: skip
 
 
 def _table(values: NDArray[Any]) -> Columns:
@@ -156,7 +149,7 @@ def _table(values: NDArray[Any]) -> Columns:
 
 def _matlab(path: Path) -> dict[str, Any]:
     """The variables of a file or, if its only variable is a structure, its fields; those of other
-    structures by names such as info.unit, and cell arrays of texts and numbers as text."""
+    structures by names such as info.unit."""
     from scipy.io import loadmat  # takes 0.1 s to import
 
     with path.open("rb") as raw:
@@ -166,25 +159,10 @@ def _matlab(path: Path) -> dict[str, Any]:
         found = loadmat(str(path), appendmat=False, simplify_cells=True)
     named = {name: each for name, each in found.items() if not name.startswith("__")}
     only = next(iter(named.values())) if len(named) == 1 else None
-    if isinstance(only, list) and only and all(isinstance(each, dict) for each in only):
-        for (k, each), name in product(enumerate(only, 1), only[0]):
-            if (count := np.size(each[name])) != 1:
-                said = f"{count} values in {name} of structure {k}, expected one in each"
-                raise FileError(f"{path}: found {said}")
-        return {name: np.array([each[name] for each in only]) for name in only[0]}
     return dict(_flat("", only if isinstance(only, dict) else named))
 
 
 def _flat(name: str, value: Any) -> Iterator[tuple[str, Any]]:
-    if isinstance(value, np.ndarray) and value.dtype.kind == "O":
-        cells = value.ravel().tolist()
-        if any(isinstance(each, str) for each in cells) and not any(map(np.ndim, cells)):
-            texts = all(isinstance(each, str) for each in cells)
-            value = np.array(cells if texts else " ".join(map(str, cells)))
-        else:
-            value = cells
-    if isinstance(value, list):
-        value = dict(enumerate(value, 1))
     if isinstance(value, dict):
         for key, each in value.items():
             yield from _flat(f"{name}.{key}" if name else key, each)

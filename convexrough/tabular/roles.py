@@ -10,8 +10,7 @@ from itertools import product
 from typing import NamedTuple
 
 from convexrough.errors import InputError
-from convexrough.tabular.arrays import FACTORS, TIMES
-from convexrough.tabular.units import NAMELESS, Unit, UnitNames, bare, in_text, known_unit, parsed
+from convexrough.tabular.units import NAMELESS, Unit, UnitNames, bare, known_unit
 
 
 class Column(NamedTuple):
@@ -39,8 +38,7 @@ COLUMNS = {
 }
 
 #: Names of columns with row numbers.
-INDEX = ("index", "id", "no", "nr", "#", "i", "number", "node", "label", "node label", "asperity",
-         "row", "")  # fmt: skip
+INDEX = ("index", "asperity", "id", "no", "nr", "#", "i", "number", "node", "label", "row", "")
 
 #: First words, in lower case, of rows that summarise a table and are not part of it.
 TOTALS = ("sum", "total", "totals", "grand total", "summe", "gesamt", "somme", "suma",
@@ -51,17 +49,6 @@ def is_index(header: str) -> bool:
     """True for the header of a column with row numbers."""
     return bare(header).lower().removesuffix(".") in INDEX
 
-
-def totals(cells: Sequence[str]) -> str:
-    """The first word of a row that summarises a table; "" for other rows."""
-    name = next(filter(None, cells), "")
-    return name if name.rstrip(" :=").lower() in TOTALS else ""
-
-
-#: Words for heights that are no lengths, or that grow downwards.
-CHANGED = re.compile(
-    r"\b(volts?|mV|waves|fringes|inverted|depths|downwards|multiplied|divided)\b", re.I
-)
 
 #: Largest number of characters of a line that are shown; similarity above which the name of an
 #: unread column may be a misspelling; and relative difference up to which factors are equal.
@@ -78,7 +65,6 @@ class Reading:
     units: UnitNames = NAMELESS  # of the scene
     convert: bool = False  # True to convert columns in other units, False to refuse them
     scalable: bool = False  # True if messages may propose the options --scale and --column
-    shared: Sequence[str] = ()  # columns also in another file, to which --scale would apply, too
     keyed: bool = False  # True if messages may propose the key `columns` of [asperities]
     alike: bool = True  # True to demand one unit of a quantity, even if the scene names none
 
@@ -111,12 +97,11 @@ def places_of(
         called = how.columns.get(name)
         if called is None:
             alike = [i for i, each in enumerate(spelt) if each in (name, *COLUMNS[name].also)]
-        else:  # the header as it is, without its unit, in lower case
-            ways = ((names, called), (bared, called), (lowered, called.lower()))
-            ranks = ([i for i, each in enumerate(known) if each == it] for known, it in ways)
-            alike = next(filter(None, ranks), [])
-            if not alike and called.isdecimal() and 1 <= int(called[:9]) <= len(names):
-                alike = [int(called) - 1]
+        else:  # the header as it is, perhaps without its unit; in lower case; or its number
+            number = int(called[:9]) if called.isdecimal() else 0
+            alike = [i for i, each in enumerate(names) if called in (each, bared[i])]
+            alike = alike or [i for i, each in enumerate(lowered) if each == called.lower()]
+            alike = alike or ([number - 1] if 0 < number <= len(names) else [])
             if not alike:
                 mistakes.append(f"columns: found {found}, expected a column {called!r}")
         if alike:
@@ -124,24 +109,18 @@ def places_of(
                          for it, place in places.items() if place == alike[0]]  # fmt: skip
             places[name] = alike[0]
         if len(alike) > 1:
-            choice = f": --column {name}={bared[alike[0]]}" if how.scalable else ""
             several = [*dict.fromkeys(bared[i] for i in alike)]
-            found_them, expected = " and ".join(map(repr, several)), f"one of them{choice}"
-            if called is not None or len(several) < len(alike):
-                found_them, expected = f"{called or several[0]!r} twice", "once"
-            mistakes.append(f"columns: found {found_them}, expected {expected}")
+            twice = len(several) < len(alike)
+            choice = f": --column {name}={several[0]}" * how.scalable
+            shown = f"{several[0]!r} twice" if twice else " and ".join(map(repr, several))
+            expected = "once" if twice else f"one of them{choice}"
+            mistakes.append(f"columns: found {shown}, expected {expected}")
     return places, mistakes
 
 
-def columns_key(named: Mapping[str, str], missing: Iterable[str], unread: Iterable[str]) -> str:
-    """The key `columns` of a scene file: the headers in `named` by known name; and for each other
-    name in `missing` an unread column with the initial of its last word or a synonym, or NAME."""
-    chosen = dict(named)
-    for name in (each for each in missing if each not in named):
-        left = [it for it in unread if it not in chosen.values() and "diam" not in it.lower()]
-        initials = tuple(each.split("_")[-1][0] for each in (name, *COLUMNS[name].also))
-        alike = [each for each in left if each.lower().startswith(initials)]
-        chosen[name] = (alike or ["NAME"])[0]
+def columns_key(named: Mapping[str, str], missing: Iterable[str]) -> str:
+    """The key `columns` of a scene file: the headers in `named` by known name, or NAME."""
+    chosen = dict.fromkeys(missing, "NAME") | dict(named)
     pairs = (f"{key} = {json.dumps(each, ensure_ascii=False)}" for key, each in chosen.items())
     return f"columns = {{{', '.join(pairs)}}} in [asperities]"
 
@@ -167,7 +146,7 @@ def factors_of(
         scene, given = how.units.unit(kind), how.scales.get(name)
         if given is not None and scene is None:
             continue
-        way = f"--scale {name}=" if how.scalable and name not in how.shared else ""
+        way = f"--scale {name}=" if how.scalable else ""
         try:
             found = known_unit(place, said, kind)
         except InputError as error:
@@ -198,33 +177,6 @@ def factors_of(
         if there and there[0] in factors and name not in units and name not in how.scales:
             mistakes.append(f"column {name}: found no unit, expected one, as {there[0]} has")
     return factors, mistakes
-
-
-def units_in(said: Iterable[tuple[str, str]], names: Sequence[str], how: Reading) -> Iterator[str]:
-    """A mistake for each text, said at a place in the file, that states a factor, or names another
-    unit than the scene's for one of the columns `names`, whose headers state none."""
-    kinds = {COLUMNS[name].kind for name in names}
-    for place, text in said:
-        if states_factor(text) and not how.scales:
-            way = ", or --scale" * how.scalable
-            yield f"{place}: found {shortened(text)!r}, expected no factor of the numbers{way}"
-        for name in in_text(text):
-            found = parsed(name)
-            kind = found.kind if found else "length"
-            scene = how.units.unit(kind)
-            if kind in kinds and not (found and scene and found.size == scene.size):
-                expected = f"units in the header, as NAME [{name}], or no such {place.split()[0]}"
-                yield f"{place}: found {shortened(text)!r}, expected {expected}"
-                break
-
-
-def states_factor(text: str) -> bool:
-    """True for a text that states a factor other than 1, or an offset other than 0."""
-    numbers = r"[+-]?[.,]?\d[\d.,]*(?:e[+-]?\d+)?|\b(?:two|ten|hundred|thousand|million)\b"
-    found = re.findall(numbers, text, re.I)
-    changes = not all(re.fullmatch(r"\+?(1(\.0*)?|0)", number) for number in found)
-    text = re.sub(r"\b(x|y|bias|scan)[\s_-]*offsets?\b", "", text, flags=re.I)  # not of heights
-    return changes and bool(FACTORS.search(text) or TIMES.search(text))
 
 
 def shortened(text: str) -> str:

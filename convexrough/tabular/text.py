@@ -1,8 +1,9 @@
-"""Tables in text files, with any separator, decimal commas, comments, titles and encodings.
+"""Text files and Excel workbooks as tables: comments, one row of names, rows of as many cells.
 
-csv.Sniffer and numpy.loadtxt support no decimal commas and no D exponents; pandas and polars stop
-at the first mistake without showing the line. So this module chooses the separator and the decimal
-mark itself.
+A comment is a line above the rows that begins with # or %; the last one may hold the names, as
+`numpy.savetxt` writes them. One separator (comma, semicolon, tab or spaces) is used in the whole
+file, and one decimal mark. csv.Sniffer and numpy.loadtxt support no decimal commas and no D
+exponents; pandas and polars stop at the first mistake without showing the line.
 """
 
 from __future__ import annotations
@@ -10,22 +11,23 @@ from __future__ import annotations
 import csv
 import re
 from collections import Counter
-from collections.abc import Container, Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from functools import partial
 from gzip import GzipFile
 from io import BufferedReader, TextIOWrapper
-from itertools import islice, zip_longest
+from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from convexrough.arrays import Array
 from convexrough.errors import FileError, InputError, needed
 from convexrough.tabular.arrays import foreign
-from convexrough.tabular.roles import is_index, shortened, totals
-from convexrough.tabular.units import bare, parsed, unit
+from convexrough.tabular.roles import TOTALS, shortened
+from convexrough.tabular.units import bare
 
 #: Largest number of characters of a line, and of a number.
 LONGEST, LONGEST_NUMBER = 2**24, 400
@@ -33,36 +35,23 @@ LONGEST, LONGEST_NUMBER = 2**24, 400
 #: Extensions of Excel workbooks.
 WORKBOOKS = (".xlsx", ".xlsm")
 
-#: The separator and the decimal mark are chosen by means of the first SAMPLE lines, and of at most
-#: LATER other lines that contain a comma or a point.
-SAMPLE, LATER = 200, 20
+#: The separator and the decimal mark are chosen by means of the first and the last SAMPLE lines,
+#: and of at most LATER others that contain a comma or a point.
+SAMPLE, LATER = 100, 20
 
 #: Cells that mean an unknown number, in lower case.
 HOLES = ("", "bad", "nan", "na", "n/a", "#n/a", "#nv", "none", "null", "---", "***")
 
-#: The sign # that starts a comment, but not the # in #N/A and other errors of spreadsheets in any
-#: language, such as #NV and #¡VALOR!; nor ####, for a narrow column, if another cell follows.
-_SIGN = r"#(?!(?-i:[¡¿]?[^\W\d_a-zß-ÿ]+[/!?]|NV(?![^\s,;]))|#{3,} *[,;\t]|##[# ]{0,99}\s[-+.,\d])"
-
-#: The beginning of a line that is a comment, and of a comment that follows cells on a line.
-COMMENT, _BEHIND = re.compile(f"{_SIGN}|%"), re.compile(rf"(?<![^\s,;]){_SIGN}")
+#: The beginning of a comment; #N/A and other errors of spreadsheets are cells.
+_COMMENT = re.compile(r"%|#(?!N/A|NV\b|\S*[!?]|##+[,;\t])", re.I)
 
 _NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]([+-]?\d+)|([+-]\d{3}))?")
-#: `_GROUPED`: a number whose digits are certainly in groups of three, such as 1,234,567.
-#: `PERHAPS_GROUPED`: a number such as 3,134, whose mark can also precede three decimals.
-_GROUPED = re.compile(
-    r"[+-]?[1-9]\d{0,2}(?:,(?:\d{3},)*\d{3}(?:\.\d*|,\d{3})|\.(?:\d{3}\.)*\d{3}(?:,\d*|\.\d{3})"
-    r"|(?:['\u2019\xa0\u202f ]\d{3})+(?:[.,]\d*)?)"
-)
-PERHAPS_GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
 #: What instruments write for a hole. Spaces may separate columns, so this is replaced.
 _NO_DATA = re.compile(r"\bno data\b", re.I)
 _SURROGATE = re.compile("[\udc80-\udcff]")
 #: The separators in a comment that may be a header.
 _APART = re.compile(r"\s*[,;\s]\s*")
 _UNIT_APART = re.compile(r"(?<!\s)\s+(?=[\[(])")
-#: A line of only dashes, equals signs, asterisks or underscores, which separates parts of a file.
-_RULE = re.compile(r"[-=*_]{3,}(\s+[-=*_]{3,})*")
 _BINARY = {
     b"PK\x03\x04": "an archive or an Excel workbook; name it .xlsx",
     b"MATLAB": "a MAT-file; name it .mat",
@@ -135,7 +124,7 @@ class Style(NamedTuple):
 STYLES = [Style(*pair) for pair in (",.", ";.", ";,", "\t.", "\t,", " .", " ,")]
 
 
-class TextRow(NamedTuple):
+class _Row(NamedTuple):
     """A line of a file: its number, text and cells; `wrong` is the error if splitting failed."""
 
     number: int
@@ -144,187 +133,115 @@ class TextRow(NamedTuple):
     wrong: str = ""
 
 
-#: Headers of columns with the row and column numbers of a matrix.
-PLACES = ("row", "col", "column", "i", "j", "zeile", "spalte")
+class Cells(NamedTuple):
+    """The cells of a file by column."""
 
-
-class TextTable(NamedTuple):
-    """The header of a file (a row of names) or None; the other rows; the style; the comments."""
-
-    header: TextRow | None
-    rows: list[TextRow]
+    header: list[str] | None
+    columns: list[Sequence[Any]]
+    rows: list[str]  # the name of each row in messages
+    lines: list[str]  # the text of each row, "" in files of arrays
     style: Style
-    comments: list[str]
+    comments: Sequence[str] = ()
+    mistakes: Sequence[str] = ()  # messages on rows that are left out
+
+    def column(self, place: int) -> NDArray[Any]:
+        """A column as numbers if all of its cells are, else as text."""
+        numbers = self.style.numbers(self.columns[place])
+        return np.array([str(cell) for cell in self.columns[place]]) if numbers is None else numbers
 
 
-def read_text_table(
-    path: Path,
-    known: Sequence[str] = (),
-    comment: re.Pattern[str] = COMMENT,
-    required: Sequence[str] = (),
-    *,
-    is_map: bool = False,
-) -> TextTable:
+def read_cells(path: Path, known: Sequence[str] = (), *, is_map: bool = False) -> Cells:
     """The cells of a text file or workbook. Raises FileError if the file is empty or not text.
 
-    known : names of columns, in lower case; the line with most of them is the header
-    required : names of columns; the sheet of a workbook with most of them, then of `known`, is read
-    is_map : True for a map of heights; exactly one sheet of a workbook must hold a map. Lines
-        of text above the numbers that are not a header are comments
+    known : names of columns, in lower case; a last comment with one of these can be the header
+    is_map : True for a map of heights: text above the numbers is a comment, unless it has as many
+        cells as they, and empty cells may be holes
     """
-    lines: list[tuple[int, str]] = []
-    comments: list[str] = []
-    titles, separator, sheet = list[tuple[int, str]](), "", ""
-    units: list[str] = []
-    numbered = _lines(path)
+    lines, comments = list[tuple[int, str]](), list[str]()
+    separator, sheet, numbered = "", "", _lines(path)
     if path.suffix.lower() in WORKBOOKS:
         separator = "\t"
-        sheet, numbered, comments = _sheet_lines(path, known, required, is_map)
+        sheet, numbered = _sheet(path, is_map)
     for number, line in numbered:
         text = line.strip("\r\n")
-        text = _NO_DATA.sub("nan", text) if is_map else text
         inner = text.strip()
         if not lines and not separator and re.fullmatch(r"sep=.", inner):  # written by Excel
             separator = inner[-1]
-        elif comment.match(inner):
+        elif not lines and _COMMENT.match(inner):
             comments.append(inner)
-            said = inner.lstrip("#% ")
-            if not units and _are_units(cells := _APART.split(said)):
-                units = cells
-            else:
-                titles.append((number, said))
-        elif ("\t" in text or inner) and not _is_rule(inner):
-            text, *behind = [text] if '"' in text else _BEHIND.split(text, maxsplit=1)
-            comments += behind if not lines else ()
+        elif inner or "\t" in text:
+            text = _NO_DATA.sub("nan", text) if is_map else text
             lines.append((number, text if separator or "\t" in text else text.strip()))
-    if not lines:
-        raise FileError(f"{path}: empty")
     styles = [Style(separator, mark, sheet) for mark in ".,"] if separator else STYLES
-    style = _sniffed([text for _, text in lines], styles)
-    _check_ungrouped(path, lines[:: 1 + len(lines) // SAMPLE], style)
-    every = [_row(number, text, style) for number, text in lines]
-    filled = [row for row in every if any(row.cells) or row.wrong]  # Excel writes empty rows as ;;
-    rows = [row for row in filled if not _RULE.fullmatch(row.text.strip())]
-    if not rows:
+    style = _sniffed([text for _, text in lines] or [""], styles[:1] if sheet else styles)
+    rows = [_row(number, text, style) for number, text in lines]
+    filled = [i for i, row in enumerate(rows) if any(row.cells) or row.wrong]
+    if not filled:
         raise FileError(f"{path}: empty")
-    above, (header, rows) = rows, _headed(rows, titles, style, known, is_map)
-    found = {bare(cell).lower() for cell in header.cells} if header else set()
-    wanted = {it for it in known if not is_index(it)} if {*required[:1]} <= found else None
-    if header and not is_map and (also := _also_heading(header, above, style, wanted)):
-        both = f"rows {min(header.number, also)} and {max(header.number, also)}"
-        expected = "the names of all columns in one row: unmerge cells and delete the other row"
-        raise FileError(f"{path}: {both}: found a heading over two rows, expected {expected}")
-    top = header.number if header and header.number else rows[0].number
-    comments += [row.text for row in above if row.number < top]
-    if header:
-        below = rows[0].cells if rows else []
-        if _are_units(below) and len(below) <= len(header.cells):
-            units, rows = below, rows[1:]
-        elif len(units) != len(header.cells) or any(map(unit, header.cells)):
-            units = []
-        named = zip_longest(header.cells, (each.strip("[]() -") for each in units), fillvalue="")
-        names = [f"{name} [{each}]" if each else name for name, each in named]
-        header = header._replace(cells=names)
-    elif len(rows[0].cells) > 3:  # a matrix, whose rows can be without numbers
-        top = top if above[0].number < top else filled[0].number
-        rows = [row for row in every if top <= row.number <= filled[-1].number]
-    return TextTable(*_trimmed(header, rows, style), style, comments)
+    rows = rows[filled[0] : filled[-1] + 1] if is_map else [rows[i] for i in filled]
+    most = len(rows) if is_map else 1
+    numeric = (i for i, row in enumerate(rows[:most]) if _numeric(row.cells, style))
+    first = next(numeric, most)
+    above, rows = [row for row in rows[:first] if any(row.cells) or row.wrong], rows[first:]
+    header = _names(above[-1].text, style) if above else None
+    if is_map and header and rows and _width(header) != _width(rows[0].cells):
+        header = None
+    for row in above if is_map else ():
+        if row.cells and style.number(row.cells[0]) is not None:
+            expected = "heights, as in the rows below, or text that begins with no number"
+            raise InputError(f"row {row.number}", found=shortened(row.text), expected=expected)
+    comments += [row.text for row in (above[:-1] if header else above)]
+    if comments and not header:
+        last = comments[-1].lstrip("#% ")
+        for names in (_names(last, style), _APART.split(_UNIT_APART.sub("", last))):
+            wanted = any(bare(name).lower() in known for name in names)
+            if wanted and len(names) == _width(rows[0].cells):
+                header = [name.strip(",;") for name in names]
+        comments = comments[:-1] if header else comments
+    if is_map and not header:
+        _refuse_gaps([row.number for row in rows])
+    return _by_column(header, rows, style, comments)
 
 
-def _headed(
-    rows: list[TextRow],
-    titles: Sequence[tuple[int, str]],
-    style: Style,
-    known: Sequence[str],
-    is_map: bool,
-) -> tuple[TextRow | None, list[TextRow]]:
-    """The header, from the rows or the last of the numbered titles, or None; and the rows below."""
-
-    def wanted(names: list[str]) -> int:
-        return sum(bare(name).lower() in known for name in names)
-
-    first = next((i for i, row in enumerate(rows) if _numeric(row.cells, style)), len(rows))
-    width = len(rows[first].cells) if first < len(rows) else 0
-    if first == 0:
-        title = next((said for number, said in titles[::-1] if number < rows[0].number), "")
-        for named in (_header(title, style), _APART.split(title.strip())):
-            count = wanted(named) + sum(name.lower() in PLACES for name in named)
-            if len(named) == width and (count >= 2 or 2 * count >= width):
-                return TextRow(0, title, named), rows
-        return None, rows
-    headers = [_header(row.text, style) for row in rows[: min(first, SAMPLE)]]
-    place = max(
-        range(len(headers)), key=lambda i: (wanted(headers[i]), len(headers[i]) == width, -i)
-    )
-    filled = sum(map(bool, map(str.strip, headers[place])))  # rows of a sheet have empty cells, too
-    if is_map and 0 < width != filled and wanted(headers[place]) < 2:
-        for row in rows[:first]:
-            if 2 * sum(style.number(cell) is not None for cell in row.cells) >= len(row.cells):
-                there = f"row {rows[first].number}"
-                expected = f"{width} heights, as in {there}, or text; or delete the lines above "
-                expected += f"{there} (if y falls from row to row, reverse the rows) and give "
-                expected += "--pixel, --unit and --height-unit"
-                raise InputError(f"row {row.number}", found=shortened(row.text), expected=expected)
-        return _headed(rows[first:], titles, style, known, is_map)
-    line, names, rows = rows[place], headers[place], rows[place + 1 :]
-    if style.separator == " " and rows:
-        first = first - place - 1 if width else 0
-        width = len(rows[first].cells)
-        apart = re.split(r"\s{2,}", line.text.strip())
-        names = apart if len(apart) == width < len(names) else names
-        rows = _unlisted(line, rows, first, style)
-    return line._replace(cells=names), rows
+def _refuse_gaps(rows: Sequence[int]) -> None:
+    """Raise InputError for empty lines between the rows of a matrix, as between two maps."""
+    apart = np.diff(rows)
+    if len(gaps := np.flatnonzero(apart > min(apart, default=1))):
+        found = f"lines without numbers between rows {rows[gaps[0]]} and {rows[gaps[0] + 1]}"
+        expected = "one map in a file: remove empty lines between its rows"
+        raise InputError("rows", found=found, expected=expected)
 
 
-def _also_heading(
-    header: TextRow, rows: list[TextRow], style: Style, wanted: Container[str] | None
-) -> int:
-    """The number of a row above or below the header that names columns which the header does not
-    name, as under merged cells of a sheet; 0 if there is none. If names are `wanted`, others do not
-    count: they may be titles."""
-    for row in rows[: SAMPLE + 1] if style.separator != " " else ():
-        if abs(row.number - header.number) != 1 or _are_units(row.cells):
-            continue
-        columns = zip_longest(header.cells, row.cells, rows[-1].cells, fillvalue="")
-        names = [cell for name, cell, last in columns if cell and last and not name]
-        names = [it for it in names if wanted is None or bare(it).lower() in wanted]
-        if names and all(style.number(cell) is None for cell in row.cells):
-            return row.number
-    return 0
-
-
-def _are_units(cells: Sequence[str]) -> bool:
-    """True for a line of units, perhaps in brackets; a cell may be a dash or empty."""
-    bared = [cell.strip("[]() ") for cell in cells]
-    return any(bared) and all(cell in ("", "-") or parsed(cell) is not None for cell in bared)
-
-
-def _unlisted(header: TextRow, rows: list[TextRow], first: int, style: Style) -> list[TextRow]:
-    """The rows of a finite-element listing, of which `rows[first]` is the first with numbers,
-    without titles, repeated headers and closing lines."""
-    width = len(rows[first].cells)
-
-    def numbers(row: TextRow) -> list[bool]:
-        return [style.number(cell) is not None for cell in row.cells]
-
-    def title(row: TextRow) -> bool:
-        are = numbers(row)
-        most = all(are[-2:]) or 2 * sum(are) > len(are)  # are numbers, so it is a row with a slip
-        return len(are) not in (0, width) and not (are[0] or most)
-
-    kept = [row for row in rows[:first] if not title(row)]
-    for row in rows[first:]:
-        if row.cells != header.cells:
-            kept.append(row)
+def _by_column(
+    header: list[str] | None, rows: Sequence[_Row], style: Style, comments: Sequence[str]
+) -> Cells:
+    """The cells, without empty ones at the ends of rows, and a mistake for each row that has not as
+    many as the header or most rows."""
+    widths = [_width(row.cells) for row in rows]
+    width = _width(header) if header else max(widths)
+    counts = [min(len(row.cells), max(width, each)) for row, each in zip(rows, widths, strict=True)]
+    width = width if header else Counter(counts).most_common(1)[0][0]
+    mistakes, whole = list[str](), list[_Row]()
+    for row, count in zip(rows, counts, strict=True):
+        wrong, name = row.wrong, next(filter(None, row.cells), "")
+        if not wrong and count != width:
+            wrong = f"found {count} cells, expected {width}, as in "
+            wrong += "the header" if header else "most rows"
+        elif name.rstrip(" :=").lower() in TOTALS:
+            wrong = f'found a row of "{name}", expected none: remove it'
+        if wrong:
+            mistakes.append(f"row {row.number}: {wrong}: {shortened(row.text)}")
         else:
-            while kept and title(kept[-1]):
-                kept.pop()
-    led = [any(numbers(row)[:1]) for row in kept]
-    count = [*led, False].index(False)
-    if not count or any(led[count:]):  # words in front are labels or slips
-        return kept
-    closing = (i for i, row in enumerate(kept) if not led[i] and (title(row) or totals(row.cells)))
-    return kept[: next(closing, None)]
+            whole.append(row)
+    return Cells(
+        header[:width] if header else None,
+        [[row.cells[i] for row in whole] for i in range(width)],
+        [f"row {row.number}" for row in whole],
+        [row.text for row in whole],
+        style if width > 1 or style.decimal == "," else style._replace(separator=""),
+        comments,
+        mistakes,
+    )
 
 
 def _lines(path: Path) -> Iterator[tuple[int, str]]:
@@ -344,61 +261,24 @@ def _lines(path: Path) -> Iterator[tuple[int, str]]:
                 yield number, line
 
 
-def _sheet_lines(
-    path: Path, known: Sequence[str], required: Sequence[str], is_map: bool
-) -> tuple[str, Iterator[tuple[int, str]], list[str]]:
-    """The sheet that `read_text_table` reads: its name, the number of sheets, and others that
-    fit equally well; its numbered rows, separated by tabs; and, for a map, rows of other sheets."""
+def _sheet(path: Path, is_map: bool) -> tuple[str, Iterator[tuple[int, str]]]:
+    """The name of the first sheet with cells, with the number of such sheets; and its numbered
+    rows, separated by tabs."""
     openpyxl = needed("openpyxl")
+
+    def line(row: Sequence[Any]) -> str:
+        cells = (str("" if cell is None else cell).replace('"', "") for cell in row)
+        return "\t".join(" ".join(cell.split()) for cell in cells)
+
     with path.open("rb") as raw, foreign():
         book = openpyxl.load_workbook(raw, read_only=True, data_only=True)
-        pages = {
-            page.title: [*map(_plain, page.iter_rows(values_only=True))] for page in book.worksheets
-        }
-
-    def value(rows: list[list[str]]) -> tuple[int, int]:
-        names = {bare(cell).lower() for row in rows[:SAMPLE] for cell in row}
-        wanted, others = (len(names & {*each}) for each in (required, known))
-        return wanted, min(others, 1) if wanted else others
-
-    values = {name: value(rows) for name, rows in pages.items()}
-    best, *others = [name for name in pages if values[name] == max(values.values())]
-    if values[best] == (0, 0):
-        others = []
-    aside: list[str] = []
-    if is_map and len(pages) > 1:
-        best, *others = [name for name, rows in pages.items() if _holds_map(rows)] or ["", *pages]
-        if others:
-            named = " and ".join(f'"{name}"' for name in (best, *others) if name)
-            found = f"{'maps' if best else 'no map'} in the sheets {named}"
-            expected = "one sheet with three or more rows of numbers; delete other such sheets"
-            raise FileError(f"{path}: found {found}, expected {expected}")
-        aside = [" ".join(row) for name in pages if name != best for row in pages[name]]
-    also = " or ".join(f'"{name}"' for name in others)
-    count = f" of {len(pages)}" * (len(pages) > 1)
-    name = f'"{best}"{count}' + (f", not {also}" if also else "")
-    return name, enumerate(map("\t".join, pages[best]), 1), aside
-
-
-def _holds_map(rows: Iterable[Sequence[str]]) -> bool:
-    """True if at least three rows hold at least three numbers, True or False each."""
-    style = Style("\t", ".")
-
-    def numbers(row: Sequence[str]) -> int:
-        return sum(cell in ("True", "False") or style.number(cell) is not None for cell in row)
-
-    return len([*islice((row for row in rows if numbers(row) >= 3), 3)]) == 3
-
-
-def _plain(row: Sequence[Any]) -> list[str]:
-    """The texts of cells, each on one line, without quotes and with a decimal point. Beside numbers
-    a text such as 1,257 is left as it is, since its comma may separate thousands."""
-    texts = [" ".join(str("" if cell is None else cell).replace('"', "").split()) for cell in row]
-    number, doubtful = Style("\t", ",").number, any(isinstance(cell, float) for cell in row)
-    return [
-        text if number(text) is None or (doubtful and PERHAPS_GROUPED.fullmatch(text))
-        else text.replace(",", ".") for text in texts
-    ]  # fmt: skip
+        pages = {it.title: [*map(line, it.iter_rows(values_only=True))] for it in book.worksheets}
+    filled = [f'"{name}"' for name, rows in pages.items() if any(map(str.strip, rows))]
+    if len(filled) != 1 and (is_map or not filled):
+        found = f"cells in the sheets {', '.join(filled) or 'none'}"
+        raise FileError(f"{path}: found {found}, expected one sheet with cells")
+    count = f" of {len(filled)}" * (len(filled) > 1)
+    return filled[0] + count, enumerate(pages[filled[0][1:-1]], 1)
 
 
 def _encoding(path: Path, raw: BufferedReader[Any]) -> str:
@@ -416,51 +296,31 @@ def _encoding(path: Path, raw: BufferedReader[Any]) -> str:
 
 def _sniffed(lines: Sequence[str], styles: Sequence[Style]) -> Style:
     """The style in which most lines have equally many cells, and most cells are numbers."""
-    marked = (line for line in islice(lines, SAMPLE, None) if "," in line or "." in line)
-    sample = [*lines[:SAMPLE], *islice(marked, LATER)]
+    marked = (line for line in lines[SAMPLE:-SAMPLE] if "," in line or "." in line)
+    last = lines[max(SAMPLE, len(lines) - SAMPLE) :]
+    sample = [*lines[:SAMPLE], *islice(marked, LATER), *last]
 
     def score(style: Style) -> float:
-        rows = [_row(0, line, style) for line in sample]
-        body = rows[1:] or rows
-        widths = [_width(row.cells) for row in rows]
+        rows = [_row(0, line, style).cells for line in sample]
+        widths = [*map(_width, rows)]
         width, _ = Counter(widths[1:] or widths).most_common(1)[0]
-        cells = [cell for row in body for cell in row.cells if cell]
+        cells = [cell for row in rows[1:] or rows for cell in row if cell]
         numbers = sum(style.number(cell) is not None for cell in cells)
-        doubtful = style.decimal == "," in lines[0] and not _numeric(rows[0].cells, style)
+        doubtful = style.decimal == "," in lines[0] and not _numeric(rows[0], style)
         equal = widths.count(width) / len(rows)
         return equal * numbers / max(1, len(cells)) * (0.5 if doubtful else 1.0)
 
     return max(styles, key=score)
 
 
-def _is_rule(line: str) -> bool:
-    """True for a rule between parts of a file, but not for several marks of holes such as ---."""
-    cells = line.split()
-    holes = len(cells) > 1 and all(cell.lower() in HOLES for cell in cells)
-    return not holes and _RULE.fullmatch(line) is not None
-
-
-def _check_ungrouped(path: Path, lines: Sequence[tuple[int, str]], style: Style) -> None:
-    """Raise FileError for numbers that certainly have thousands separators."""
-    for number, line in lines:
-        separator = next((each for each in ";\t" if each in line), style.separator)
-        if separator == "," and '"' not in line:
-            continue  # a comma separates
-        row = _row(number, line, Style(separator, "."))
-        for cell in line.split() if separator == " " else row.cells:
-            if _GROUPED.fullmatch(cell):
-                expected = "numbers without thousands separators"
-                raise FileError(f"{path}: row {number}: found {cell}, expected {expected}")
-
-
-def _row(number: int, text: str, style: Style) -> TextRow:
+def _row(number: int, text: str, style: Style) -> _Row:
     try:
-        return TextRow(number, text, style.split(text))
+        return _Row(number, text, style.split(text))
     except csv.Error:
-        return TextRow(number, text, [], "found quotes that do not end on this line")
+        return _Row(number, text, [], "found quotes that do not end on this line")
 
 
-def _header(text: str, style: Style) -> list[str]:
+def _names(text: str, style: Style) -> list[str]:
     """The cells of a header line: names of columns, each perhaps followed by a unit in brackets."""
     row = _row(0, _UNIT_APART.sub("", text) if style.separator == " " else text, style)
     return row.cells or [text]
@@ -474,26 +334,4 @@ def _numeric(cells: Sequence[str], style: Style) -> bool:
 
 def _width(cells: Sequence[str]) -> int:
     """The number of cells without empty ones at the end, which trailing separators cause."""
-    width = len(cells)
-    while width and not cells[width - 1]:
-        width -= 1
-    return width
-
-
-def _trimmed(
-    header: TextRow | None, rows: list[TextRow], style: Style
-) -> tuple[TextRow | None, list[TextRow]]:
-    """Header and rows without empty cells at the end; the name of R's row numbers is ""."""
-    widths = [_width(row.cells) for row in rows]
-    width = max(widths, default=0)
-    if header:
-        names = header.cells[: _width(header.cells)]
-        if style.separator in " \t" and {*widths} == {len(names) + 1}:
-            count = {style.number(row.cells[0]) for row in rows}
-            if count in ({*range(len(rows))}, {*range(1, len(rows) + 1)}):
-                names = ["", *names]
-        header, width = header._replace(cells=names), len(names)
-    return header, [
-        row if len(row.cells) <= width else row._replace(cells=row.cells[: max(width, own)])
-        for row, own in zip(rows, widths, strict=True)
-    ]
+    return max((i for i, cell in enumerate(cells, 1) if cell), default=0)

@@ -65,16 +65,6 @@ _ALSO |= {f"{long}met{end}": f"{short}m" for long, short in _LONG.items()
 _FACTOR = re.compile(r"(.*?)(?:\^|\*\*)?([+-]?\d)?")
 _POWERS = str.maketrans("⁻¹²³μ−", "-123µ-")
 
-#: A unit of length or force in a sentence. "um", "m", "metre" and "N" count only after a digit, a
-#: mark, "in" or a word such as "unit", because they can also be words or symbols.
-_IN_TEXT = re.compile(
-    r"(?<![^\W\d])((?i:nm|µm|μm|mm|Å|[aå]ngstr[oö]ms?|microns?|inch(?:es)?|(?-i:mils?|thou|feet)"
-    r"|(?:pico|nano|mi[ck]ro|milli|[cz]enti)m[eè]t(?:ers?|er?n|res?|ri|ros?))|cm|[nµμmkM]N|kgf|lbf)(?!\w)"
-    r"|(?:[\d(\[,:=]\s*|\b[Ii]n\s+|\b(?i:units?|einheit(?:en)?|length)\b[\s;:=]*)"
-    r"((?i:um|ft|met(?:er|re)[sn]?)|[mN])(?![\w/]|\s*=)"
-    r"|(纳米|微米|毫米)"
-)
-
 #: The name of a column with its unit, which has at most LONGEST_NAME characters.
 LONGEST_NAME = 400
 _WITH_UNIT = re.compile(
@@ -84,15 +74,6 @@ _LOOSE = re.compile(r"(.*?[^\W_])(?:[\s_]+in[\s_]+|[\s_.]+)([^\s_./]{2,})")
 
 #: Units that after a name and a space, a point or "_" are not read as units.
 AMBIGUOUS = ("in", "bar", "pm")
-
-
-def in_text(text: str) -> list[str]:
-    """The units of length and force in a sentence, or all units in a text of units alone."""
-    cells = re.split(r"\s*[;,\t]\s*", text.strip(" #%"))
-    alone = len(cells) == 1 and not re.fullmatch(r"[^\W\d_]{2,}", cells[0])  # no word
-    if not alone and all(each and parsed(each) for each in cells):
-        return cells
-    return [next(filter(None, found.groups())) for found in _IN_TEXT.finditer(text)]
 
 
 def parsed(name: str) -> Unit | None:

@@ -23,7 +23,7 @@ from convexrough.scene.neighbours import nearest_distances
 from convexrough.scene.scene import Scene
 from convexrough.surface.map_arrays import steps
 from convexrough.tabular.columns import bound
-from convexrough.tabular.roles import COLUMNS, Reading
+from convexrough.tabular.roles import COLUMNS, Reading, shortened
 from convexrough.tabular.table import ReadTable, read_table, refuse
 from convexrough.tabular.units import bare, unit
 from convexrough.verdict.placing import Placing, unused
@@ -169,12 +169,10 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
             return f"load of asperity {i}{what}"
         return table.mistake(i, f", column {name}{what}")
 
-    if not any(" in another order: --column" in each for each in place.mistakes):
-        place.mistakes += _negative(forces if summed else values, floor, how.sign, read, mistake)
-        if name == "load" and not summed:
-            place.mistakes += _contradicted(values, floor, table)
+    place.mistakes += _negative(forces if summed else values, floor, how.sign, read, mistake)
+    if name == "load" and not summed:
+        place.mistakes += _contradicted(values, floor, table)
     refuse(path, place.mistakes)
-    place.how += place.part
     status = None
     if "status" in columns:
         status = np.full(len(scene), "open", dtype=np.result_type(columns["status"], "U4"))
@@ -186,7 +184,8 @@ def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Cla
         units.append(f"column {name}, not pressure")
     read_how = [*(_not_compared(table, values > floor) if name == "load" else ()), place.how]
     read_how += () if summed else _of_another_scene(table, scene, owners)
-    note = ", ".join(filter(None, [table.style, *units, *read_how]))
+    comments = f"comments not used: {shortened(' '.join(table.comments))}" if table.comments else ""
+    note = ", ".join(filter(None, [table.style, *units, *read_how, comments]))
     explained, numbers = [*_explained(table), *read_how], [it for it in columns if COLUMNS[it].kind]
     return Claimed(path, frozen(forces), status, f"{path}: {note}", explained, numbers)
 

@@ -1,5 +1,6 @@
 """Files of maps as people have them, and as they should not be."""
 
+import re
 import sys
 from importlib import import_module
 from importlib.util import find_spec
@@ -43,8 +44,7 @@ def test_arrays(tmp_path: Path) -> None:
     axes = sides | {"x": 2.0 * X[0], "y": 3.0 * Y[:, 0]}
     assert raw(several, axes).pixel == (2.0, 3.0)
     single = HEIGHTS.astype(np.float32)
-    named = {"whatever": single, "other": np.zeros(3)}
-    assert_array_equal(raw(several, named, pixel=1.0).heights, single)
+    assert_array_equal(raw(several, {"whatever": single}, pixel=1.0).heights, single)
     assert raw(alone, (100 * HEIGHTS).astype(np.int16), pixel=50.0).heights.dtype == np.float64
     points = np.column_stack([it.ravel() for it in (2.0 * X, 3.0 * Y, HEIGHTS)])[::-1]
     lists = dict(zip("xyz", points.T[:, :, None], strict=True))
@@ -52,17 +52,14 @@ def test_arrays(tmp_path: Path) -> None:
         surface = raw(path, made)
         assert_allclose(surface.heights, HEIGHTS)
         assert_allclose(surface.pixel, (2.0, 3.0))
-    assert_array_equal(raw(several, sides | {"title": "a", "log": np.zeros(3)}).heights, HEIGHTS)
     microns = {"pixel": 1.0, "unit": "µm"}
     for name in ("height_nm", "Z_nm", "topography in nm"):
-        found = raw(several, microns | {name: 1e3 * HEIGHTS, "by": "Anna"})
+        found = raw(several, microns | {name: 1e3 * HEIGHTS})
         assert_allclose(found.heights, HEIGHTS, rtol=1e-14)
-        assert found.comments == ("by: Anna",)
-    more = {"scale": 0.5, "z_unit": "nm", "step": [1, 1, 1], "inverted": True, "sign": -1.0}
-    more |= {"ok": HEIGHTS > 0, "state": (HEIGHTS > 0).astype(int), "z": 2 * HEIGHTS, "t": X[0]}
+    more = {"scale": 0.5, "z_unit": "nm", "ok": HEIGHTS > 0, "log": np.zeros(3), "note": "in nm"}
     nano = microns | {"height_nm": HEIGHTS, "height_unit": "µm"}
     for arrays, said in (
-        *((sides | {name: each}, f"arrays: found {name}, expected pixel, unit, hei")
+        *((sides | {name: each}, f"arrays: found {name}, expected heights and pix")
           for name, each in more.items()),
         (axes | {"pixel": [2.0, 2.0]}, "pixel: found 2 by 2, expected 2 by 3, the steps of x"),
         (sides | {"x": X[0]}, "arrays: found only x, expected x and y, or neither"),
@@ -72,16 +69,15 @@ def test_arrays(tmp_path: Path) -> None:
         (nano, "height_unit: found µm, expected nm, as the file says"),
         *(({"heights": np.zeros(shape), "pixel": 1.0}, "heights: found shape .* at least 3 of each")
           for shape in ((0, 5), (5, 0), (0,))),
-        (sides | {"heights": np.vstack((X[:1], HEIGHTS))}, "row 1: found numbers 0, 1, 2, ..., e"),
+        (sides | {"heights": np.vstack((X[:1], HEIGHTS))}, "row 1: found 0, 1, 2, 3, .*, exp"),
         ({"a": np.array([(i, j, i % 2, 5) for i in range(9) for j in range(7)])},
-         "columns: found 4 columns without a header, two of which are coordinates"),
-        (sides | {"note": "heights in nm"}, "comments: found note: heights in nm, expected"),
+         "columns: found 4 columns without a header, expected their names above them"),
     ):  # fmt: skip
         with pytest.raises(cr.InputError, match=said):
             raw(several, arrays)
     for beside, said in (
-        ({"scale": 0.5, "of": {"unit": "nm"}}, "arrays: found info.scale, info.of.unit, expected"),
-        (np.array(["scale", 0.5], dtype=object), "comments: found info: scale 0.5, expected"),
+        ({"scale": 0.5, "of": {"unit": "nm"}}, "arrays: found info.scale, info.of.unit, exp"),
+        (np.array(["scale", 0.5], dtype=object), "arrays: found info, expected heights and pixel"),
     ):
         with pytest.raises(cr.InputError, match=said):
             raw(tmp_path / "b.mat", {"heights": HEIGHTS, "info": beside}, pixel=1.0)
@@ -97,7 +93,7 @@ def test_what_gwyddion_writes(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "header", ["x [mm], y [mm], Höhe [µm]\n", "X/mm,Y/mm,Z/µm\n", "# x,y,z\n# mm,mm,µm\n", ""]
+    "header", ["x [mm], y [mm], Höhe [µm]\n", "X/mm,Y/mm,Z/µm\n", "# x (mm),y (mm),z (µm)\n", ""]
 )
 def test_lists(tmp_path: Path, header: str) -> None:
     rows = np.column_stack((10 * X.ravel() + 3, 20 * Y.ravel(), HEIGHTS.ravel()))
@@ -107,8 +103,8 @@ def test_lists(tmp_path: Path, header: str) -> None:
     named = "µm" in header
     assert surface.unit == ("mm" if named else "")
     assert_allclose(surface.heights, HEIGHTS * (1e-3 if named else 1), rtol=1e-14)
-    more = "".join(f"{i},run 7,{line}\n" for i, line in enumerate(matrix(rows, ",").splitlines()))
-    assert_allclose(raw(tmp_path / "a.csv", f"id,note,x,y,z\n{more}").heights, HEIGHTS)
+    more = "".join(f"{i},{line}\n" for i, line in enumerate(matrix(rows, ",").splitlines()))
+    assert_allclose(raw(tmp_path / "a.csv", f"id,x,y,z\n{more}").heights, HEIGHTS)
 
 
 def test_rounded_coordinates_and_spaced_rows(tmp_path: Path) -> None:
@@ -117,13 +113,13 @@ def test_rounded_coordinates_and_spaced_rows(tmp_path: Path) -> None:
     surface = raw(tmp_path / "a.xyz", "\n".join(rows).replace("np.float64(", "").replace(")", ""))
     assert_array_equal(surface.heights, heights)
     assert_allclose(surface.pixel, 0.65e-3, rtol=5e-3)
-    spaced = raw(tmp_path / "a.txt", "# a\n\n" + matrix(ending="\n\n") + "# end\n\n", pixel=1.0)
+    spaced = raw(tmp_path / "a.txt", "\n\n" + matrix(ending="\n\n") + "\n\n", pixel=1.0)
     assert_array_equal(spaced.heights, HEIGHTS)
 
 
 @pytest.mark.parametrize(("separator", "mark"), [(";", ","), (";", "."), ("\t", ","), (" ", ",")])
 def test_decimals_after_many_whole_numbers(tmp_path: Path, separator: str, mark: str) -> None:
-    cells = np.full((400, 4), "0", dtype=object)
+    cells = np.full((400, 8), "0", dtype=object)
     cells[350:] = f"-0{mark}25"
     surface = raw(tmp_path / "a.txt", "\n".join(map(separator.join, cells)), pixel=1.0)
     assert_array_equal(surface.heights[348:352, 0], [0, 0, -0.25, -0.25])
@@ -157,34 +153,27 @@ def test_bad_pixels(tmp_path: Path, mark: str, listed: bool) -> None:
     assert_allclose(np.delete(filled.heights, 3, 0), np.delete(HEIGHTS, 3, 0), atol=1e-9)
 
 
-INFORMATION = [["Operator", "Lens"], ["Dana", 50], [3.0, "x"]]
-
-
-def test_the_only_sheet_with_a_map(tmp_path: Path) -> None:
-    path, both = tmp_path / "a.xlsx", 'in the sheets "Sheet" and "Sheet1", expected one sheet'
+def test_the_only_sheet(tmp_path: Path) -> None:
+    path = tmp_path / "a.xlsx"
     points = [["x", "y", "z"], *np.column_stack([X.ravel(), Y.ravel(), HEIGHTS.ravel()]).tolist()]
     for sheet in (HEIGHTS.tolist(), points):
-        for sheets, name in (([INFORMATION, sheet], "Sheet1"), ([sheet, INFORMATION], "Sheet")):
-            surface = raw(path, sheets, pixel=1.0)
-            assert_allclose(surface.heights, HEIGHTS)
-            assert surface.source == f'{path}, sheet "{name}" of 2'
-        with pytest.raises(cr.FileError, match=f"found maps {both}"):
-            raw(path, [sheet, (HEIGHTS > 0).tolist()], pixel=1.0)
-        with pytest.raises(cr.InputError, match="comments: found Pixel 0"):
+        surface = raw(path, [[], sheet], pixel=1.0)
+        assert_allclose(surface.heights, HEIGHTS)
+        assert surface.source == f'{path}, sheet "Sheet1"'
+        with pytest.raises(cr.FileError, match='found cells in the sheets "Sheet", "Sheet1", exp'):
             raw(path, [sheet, [["Pixel", 0.5]]], pixel=1.0)
     beside = [[None, *row] for row in points]  # as from column B on
     assert_allclose(raw(path, [beside]).heights, HEIGHTS)
     titled = [["Surface map"], [], *HEIGHTS.tolist()]
-    assert_allclose(raw(path, [titled], pixel=1.0).heights, HEIGHTS)
-    with pytest.raises(cr.FileError, match=f"found no map {both}"):
-        raw(path, [INFORMATION, INFORMATION], pixel=1.0)
+    units = {"pixel": 1.0, "unit": "nm", "height_unit": "nm"}
+    assert_allclose(raw(path, [titled], **units).heights, HEIGHTS)
 
 
 def test_few_decimals_are_no_thousands(tmp_path: Path) -> None:
-    """Not without a whole number of three digits; 999 and more can mark holes."""
-    for cells in ("1.125 2 3", "1.125 -999 12.250", "1.125 -9999 120", "1.125 120 0.125"):
+    """Not without a whole number; 0, and 999 and more, which can mark holes, say nothing."""
+    for cells in ("1.125 0 3.250", "1.125 -999 12.250", "1.125 -9999 120", "1.125 120 0.125"):
         heights = np.outer([1, 1, 1], np.float64(cells.split()))
-        surface = raw(tmp_path / "a.txt", f"{cells} 7\n" * 3, pixel=1.0, fill=True)
+        surface = raw(tmp_path / "a.txt", f"{cells} 7.5\n" * 3, pixel=1.0, fill=True)
         assert_array_equal(surface.heights[:, 0], heights[:, 0])
 
 
@@ -220,20 +209,19 @@ KEYENCE = '"Model","VK"\n"XY calibration","276","nm"\n"Horizontal","9"\n\n"Heigh
 #: Contents, in which @ is a matrix, with options, and what is said of them.
 WRONG: list[tuple[str, dict[str, Any], str]] = [
     ("Height [nm]\n@", ONE, r"comments: found Height \[nm\], expected "),
-    ("0.5 1.5 no 2.5\n@", ONE, "row 1: found 0.5 1.5 no 2.5, expected 9 heights, as in row 2, or"),
-    (f"{KEYENCE}{matrix(separator=',')}", ONE, 'row 3: found "Horizontal","9", .*delete the lines'),
-    ("step 0.5\nNODATA_value -9999\n@", ONE,
-     "row 1: found step 0.5, .* reverse the rows.* --pixel"),
+    ("0.5 1.5 no 2.5\n@", ONE, "row 1: found 0.5 1.5 no 2.5, expected heights, as in the rows bel"),
+    (f"{KEYENCE}{matrix(separator=',')}", ONE, 'comments: found "Model","VK", expected --pi'),
+    ("step 0.5\nNODATA_value -9999\n@", ONE, "header: found NODATA_value -9999, expected nrows 7"),
     (ESRI.replace("7", "8"), {}, "header: found ncols 9, nrows 8, .*expected nrows 7 and ncols 9"),
     (ESRI.replace("cellsize 2.5\n", "dx 1\n"), ONE, "header: .*, cellsize or dx and dy, each once"),
     (f"cellsize 2\n{ESRI}", {}, "header: found cellsize 2, .*, cellsize 2.5, .* each once"),
     (f"# Width: 9 m\n# Height: 7 m\n{ESRI}", {}, "header: found width, height, ncols"),
     (ESRI, {"pixel": 2.0}, "pixel: found 2 by 2, expected 2.5 by 2.5, as the file states"),
-    ("-0,359,-0,042,0,100\n" * 3, ONE, "rows: found up to 6 parts between commas, expected num"),
+    ("-0,359,-0,042,0,100\n" * 3, ONE, "rows: found decimals between commas, expected decimal p"),
     *((f"1,9{apart}-0,7{apart}12,3\n-0,4{apart}2,0{apart}-3,1\n8,8{apart}0,1{apart}1,2\n", ONE,
-       "rows: found up to 6 parts between commas, expected num") for apart in (",", ", ")),
+       "rows: found decimals between commas, expected decimal p") for apart in (",", ", ")),
     ("% x y z in mm\n0 0 1\n1 0 2\n0 1 1\n1 1 1\n", {},
-     r'"x \[µm\] y \[µm\] z \[nm\]" above columns'),
+     r"comments: found % x y z in mm, expected --pixel and --height-unit .* as z \[nm\]"),
     ("@", {}, "pixel: found none, expected its size, which the file does not state"),
     (matrix(HOLED), ONE, r"found 7 holes \(nan\) in 63 pixels, .*fill=True, --fill"),
     (matrix(np.full((7, 9), np.nan)), ONE | {"fill": True}, "expected some heights"),
@@ -243,7 +231,7 @@ WRONG: list[tuple[str, dict[str, Any], str]] = [
      "rms slope .* check height_unit, µm, and unit"),
     ("@", {"pixel": (1.0, 1.0, 1.0)}, "found 3 numbers"),
     ("# x y quality\n0,0,1\n1,0,2\n", ONE, "columns: found x, y, quality, expected a column"),
-    (INDEXED, ONE, "columns: found 4 columns without a header, two of which are coordinates"),
+    (INDEXED, ONE, "columns: found 4 columns without a header, expected their names above them"),
     ("@", {"pixel": (1.0, 30.0)}, "found 1 by 30, expected sides at most 1 to 10"),
     ("@", ONE | {"fill": "no"}, "fill: found no, expected True or False"),
     ("@", ONE | {"unit": 5}, "unit: found 5, expected a name, as"),
@@ -251,17 +239,17 @@ WRONG: list[tuple[str, dict[str, Any], str]] = [
     ("@", ONE | {"height_unit": "nm"}, "unit: found none, expected the unit of"),
     ("# Width: 9 µm\n# Height: 7 µm\n@", {"unit": "nm"}, "unit: found nm, expected "),
     ("# Width: 9 µm\n# Height: 7 nm\n@", {}, "units: found µm and nm, expected one"),
-    *((f"# Width: 9 µm\n# Height: {each}\n@", ONE, f"comments: found height {each}, expected a len")
+    *((f"# Width: 9 µm\n# Height: {each}\n@", ONE, f"found width 9 µm, height {each}, expected a w")
       for each in ("1,000 µm", "twice")),
     ("# Width: 9 m\n# Height: 7 m\n# Width: 9 mm\n@", {}, "found width 9 m, height 7 m, width 9 m"),
-    ("# Height: 7 µm\n@", ONE | {"unit": "mm"}, "comments: found only a hei"),
+    ("# Height: 7 µm\n@", ONE | {"unit": "mm"}, "comments: found height 7 µm, expected a wid"),
     ("# Width: 9 m\n# Height: 7 m\n@", {"pixel": 2.0}, "found 2 by 2, expected 1 by"),
     ("@" + matrix([HEIGHTS.mean(axis=0).round(3)]), ONE, "last row: found the means of"),
-    ("# z unit: nm\n@", ONE | {"unit": "mm"}, "comments: found # z unit.*, or also --height-unit"),
+    ("# z unit: nm\n@", ONE | {"unit": "mm"}, "comments: found # z unit: nm, expected --pix"),
     ("# Value units: V\n@", ONE | {"unit": "m"}, "height_unit: found 'V'"),
-    (2 * "# Width: 9 m\n# Height: 7 m\n@", {}, "rows: found lines without numbers"),
+    (2 * "# Width: 9 m\n# Height: 7 m\n@", {}, "row 10: found 4 cells, expected 9, as in mos"),
     ("@\n@", ONE, "without numbers between rows 7 and 9, expected one map"),
-    ('"-0,1","0,2","0,1","0,4"\n' * 4, ONE, "row 1: found -0,1, expected decimal points, not c"),
+    ('"-0,1","0,2","0,1","0,4"\n' * 4, ONE, "columns: found -0,1, 0,2, 0,1, 0,4, expected"),
     ("@1 2\n", ONE, "row 8: found 2 cells, expected 9, as in most rows: 1 2"),
     ("a b c d e f g h i\n@", ONE, "columns: found a, b, c, .*, expected a column 'x'"),
     ("x,y,z\n1,1,1\n2,2,2\n1,1,3\n2,1,1\n", {}, "x, y: found the point 1, 1 2 times, exp"),
@@ -274,14 +262,14 @@ WRONG: list[tuple[str, dict[str, Any], str]] = [
     ("", {}, "empty"),
     ("x,y,z\n", {}, "rows: found none below the header"),
     ("1 2 3 4\n", ONE, "shape"),
-    ("0 1 2 3 4 5 6 7 8\n@", ONE, "row 1: found numbers 0, 1, 2, ..."),
-    ("y\\x .2 .4 .6\n0.0 1 2 1\n0.2 2 5 3\n0.4 1 4 1\n", ONE, "row 1: found numbers 0.2, 0.4, "),
-    (NUMBERED, ONE, "column 1: found numbers 0, 1, 2, ..., expected heights alone: leave coord"),
+    ("0 1 2 3 4 5 6 7 8\n@", ONE, "row 1: found 0, 1, 2, .*, expected heights alone"),
+    ("y\\x .2 .4 .6\n0.0 1 2 1\n0.2 2 5 3\n0.4 1 4 1\n", ONE, "found .*, .2, .4, .6, exp"),
+    (NUMBERED, ONE, "column 1: found 0, 1, 2, .*, expected heights alone: leave coord"),
     (THOUSANDS, ONE, "row 1: found 1,003, and 990 in row 11, expected .* thousands"),
     (FEW_THOUSANDS, ONE, "row 5: found 1.013, and 827 in row 1, expected .* thousands"),
     ("x;y;z\n0;0;827\n0;1;9\n1;0;1.000\n1;1;12\n", {}, "row 4: found 1.000, and 827 in row 2"),
-    (THOUSANDS.replace("1,0", "1,000,0"), ONE, "row 1: found 1,000,003, expected"),
-    (THOUSANDS.replace(",", "'"), ONE, "row 1: found 1'003, expected numbers w"),
+    (THOUSANDS.replace("1,0", "1,000,0"), ONE, "row 1: found 1,000,003;.*, expected heights"),
+    (THOUSANDS.replace(",", "'"), ONE, "columns: found 1'011, 990, 1'007, 1'002, exp"),
     (" ".join((*matrix().split(" ")[:-1], "-1.#IND")), ONE, "found '-1.#IND'"),
 ]  # fmt: skip
 
@@ -306,44 +294,32 @@ def test_an_esri_grid(tmp_path: Path, width: int) -> None:
     assert_array_equal(surface.heights[3, :2], heights[3, :2])
     sides = content.replace("cellsize 2.5", "dy 2,5\ndx 0,5")
     assert raw(tmp_path / "b.asc", sides, unit="m", fill=True).pixel == (0.5, 2.5)
-    listed = raw(tmp_path / "a.txt", "nrows 3\nx,y,z\n0,0,1\n1,1,3\n2,2,2\n", fill=True)
-    assert listed.comments == ("nrows 3",)
 
 
-@pytest.mark.parametrize(
-    "said",
-    [
-        *("z [nm]", "height (nm)", "all lengths in nm", "heights in nanometres", "Height map, nm"),
-        *("values in Angstrom", "scale factor 0.001", "dx = 0.5", "lateral resolution 0.5 µm/px"),
-        *("ZCal: 0.5", "Gain: 0.5", "heights multiplied by two", "Mult 2", "heights in waves"),
-        *("z in counts", "volts", "z * 1000", "Faktor 0,5", "heights x1000", "LSB=0.1", "inverted"),
-        *("heights in mils", "height unit: inch", "raw / 100", "raw x 0.01", "z offset = 5"),
-        *("values times ten", "in metres", "um", "Mikrometer", "in picometres", "micrometri"),
-        *("Depth (positive down)", "Z axis points down"),
-        *("高度: 128.0 微米", "z unit: nm; pixel size 1 um", "in um", "z [um]"),
-    ],
-)
-def test_comments_on_scales_are_not_ignored(tmp_path: Path, said: str) -> None:
-    path, made = tmp_path / "map.txt", f"# {said}\n{matrix()}"
-    with pytest.raises(cr.InputError, match="comments: found # "):
-        raw(path, made, pixel=1.0, unit="µm")
-    assert raw(path, made, pixel=1.0, unit="µm", height_unit="µm").pixel == (1.0, 1.0)
+@pytest.mark.parametrize("said", ["# z [nm]", "# Operator: Anna", "Sample 3, after polishing"])
+def test_comments_may_hold_units_or_factors(tmp_path: Path, said: str) -> None:
+    path, made = tmp_path / "map.txt", f"{said}\n{matrix()}"
+    for known in ({}, {"pixel": 1.0}, {"pixel": 1.0, "unit": "µm"}, {"height_unit": "µm"}):
+        with pytest.raises(cr.InputError, match=rf"comments: found {re.escape(said)}, expected --"):
+            raw(path, made, **known)
+    surface = raw(path, made, pixel=1.0, unit="µm", height_unit="µm")
+    assert (surface.pixel, surface.comments) == ((1.0, 1.0), (said,))
 
 
-def test_other_text_above_the_numbers_is_a_comment(tmp_path: Path) -> None:
+def test_text_above_the_numbers_is_a_comment(tmp_path: Path) -> None:
     """Above a matrix and above columns, in which No Data marks a hole."""
-    said = "# Messung um 12:30\n# 3.4.2020\n# Operator: Max Nmeyer\n# scan 3 of 7, 20 °C, m = 5\n"
-    for text in (said, "Instrument: FocusVar X\nDate: 2026-03-01\nPoints X: 9\n\n"):
-        surface = raw(tmp_path / "map.txt", text + matrix(), pixel=1.0)
-        assert_array_equal(surface.heights, HEIGHTS)
-        assert surface.comments == tuple(text.strip().splitlines())
-    lines = [f"{i} {j} {HEIGHTS[j, i]!s}" for j, i in np.ndindex(7, 9)]
-    lines[5] = "5 0 No Data"
+    known = {"pixel": 1.0, "unit": "µm", "height_unit": "µm"}
+    text = "Instrument: FocusVar X\nDate: 2026-03-01\nPoints X: 9\n\n"
+    surface = raw(tmp_path / "map.txt", text + matrix(), **known)
+    assert_array_equal(surface.heights, HEIGHTS)
+    assert surface.comments == tuple(text.strip().splitlines())
+    rows = [f"{i} {j} {HEIGHTS[j, i]!s}" for j, i in np.ndindex(7, 9)]
+    rows[5] = "5 0 No Data"
     for title in ("Sample 3, after polishing\n", ""):
-        surface = raw(tmp_path / "map.xyz", title + "\n".join(lines), fill=True)
+        surface = raw(tmp_path / "map.xyz", title + "\n".join(rows), fill=True, **known)
         assert np.argwhere(surface.filled_pixels).tolist() == [[0, 5]]
         assert_array_equal(surface.heights[1:], HEIGHTS[1:])
-    turned = raw(tmp_path / "map.xyz", "Sample A\n# y x z\n" + "\n".join(lines), fill=True)
+    turned = raw(tmp_path / "map.xyz", "Sample A\n# y x z\n" + "\n".join(rows), fill=True, **known)
     assert_array_equal(turned.heights.T, surface.heights)
 
 
