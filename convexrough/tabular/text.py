@@ -179,20 +179,20 @@ def read_cells(path: Path, known: Sequence[str] = (), *, is_map: bool = False) -
     if not filled:
         raise FileError(f"{path}: empty")
     rows = rows[filled[0] : filled[-1] + 1] if is_map else [rows[i] for i in filled]
-    most = len(rows) if is_map else 1
-    numeric = (i for i, row in enumerate(rows[:most]) if _numeric(row.cells, style))
-    first = next(numeric, most)
-    above, rows = [row for row in rows[:first] if any(row.cells) or row.wrong], rows[first:]
-    header = _names(above[-1].text, style) if above else None
-    if is_map and header and rows and _width(header) != _width(rows[0].cells):
-        header = None
-    for row in above if is_map else ():
-        if row.cells and style.number(row.cells[0]) is not None:
-            expected = "heights, as in the rows below, or text that begins with no number"
-            raise InputError(f"row {row.number}", found=shortened(row.text), expected=expected)
-    comments += [row.text for row in (above[:-1] if header else above)]
+    if is_map:
+        heights = next((row for row in rows if _numeric(row.cells, style)), rows[-1])
+        widths = (_width(_names(row.text, style)) for row in rows)
+        start = [*widths].index(_width(_names(heights.text, style)))
+        for row in rows[:start]:
+            if row.wrong or (row.cells and style.number(row.cells[0]) is not None):
+                expected = "heights, as in the rows below, or text that begins with no number"
+                raise InputError(f"row {row.number}", found=shortened(row.text), expected=expected)
+        comments += [row.text for row in rows[:start] if any(row.cells)]
+        rows = rows[start:]
+    header = None if _numeric(rows[0].cells, style) else _names(rows[0].text, style)
+    rows = rows[1:] if header else rows
     if comments and not header:
-        last = comments[-1].lstrip("#% ")
+        last = comments[-1].lstrip("#% ").rstrip(",;\t ")
         for names in (_names(last, style), _APART.split(_UNIT_APART.sub("", last))):
             wanted = any(bare(name).lower() in known for name in names)
             if wanted and len(names) == _width(rows[0].cells):
