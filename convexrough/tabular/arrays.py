@@ -86,9 +86,9 @@ def read_arrays(path: Path, known: Sequence[str]) -> tuple[Columns, list[str]]:
     else:
         arrays = {name: np.atleast_1d(np.squeeze(each)) for name, each in named.items()
                   if isinstance(each, np.ndarray) and each.ndim}  # fmt: skip
-        columns = _of_one_shape(path, arrays, known)
+        columns = _of_one_shape(arrays, known)
         if not columns:
-            expected = "vectors by name, or only one matrix or structure"
+            expected = "vectors or matrices of one shape by name, or only one matrix or structure"
             raise FileError(f"{path}: found {', '.join(named)}, expected {expected}")
     wanted = [name for name in columns if name.lower() in known] or list(columns)
     lengths = {len(columns[name]) for name in wanted}
@@ -126,16 +126,12 @@ def _is_table(name: str, values: Any, known: Sequence[str]) -> bool:
     return is_matrix and (name.lower() not in known or len(values[0]) <= 3)
 
 
-def _of_one_shape(path: Path, arrays: dict[str, NDArray[Any]], known: Sequence[str]) -> Columns:
-    """All vectors; or all arrays of one two-dimensional shape, if all `known` arrays have it."""
-    shapes = {name: each.shape for name, each in arrays.items() if name.lower() in known}
-    shape = next((shape for shape in shapes.values() if len(shape) > 1), None)
-    if shape and (len(shapes) == 1 or {*shapes.values()} != {shape}):
-        found = ", ".join(f"{name} of {' x '.join(map(str, it))}" for name, it in shapes.items())
-        expected = "vectors, or matrices x, y (as of meshgrid) and values of one shape"
-        raise FileError(f"{path}: found {found} numbers, expected {expected}")
+def _of_one_shape(arrays: dict[str, NDArray[Any]], known: Sequence[str]) -> Columns:
+    """All vectors; or all arrays of one shape, as of meshgrid, if all `known` arrays have it."""
+    shapes = [each.shape for name, each in arrays.items() if name.lower() in known]
+    wide = shapes[0] if len(shapes) > 1 and len({*shapes}) == 1 and len(shapes[0]) > 1 else None
     return {name: each.ravel().tolist() for name, each in arrays.items()
-            if (each.shape == shape if shape else each.ndim == 1)}  # fmt: skip
+            if (each.shape == wide if wide else each.ndim == 1)}  # fmt: skip
 
 
 def _table(values: NDArray[Any]) -> Columns:

@@ -42,8 +42,8 @@ REACH, BY_CHANCE, FEW_FAR = 0.9, 0.25, 0.1
 #: At most this many unread columns are named.
 MOST_UNREAD = 8
 
-#: Names of columns that can only be indices of asperities.
-SURELY_INDEX = ("index", "asperity")
+#: Names of columns that are indices of asperities.
+SURELY_INDEX = ["index", "asperity"]
 
 
 @dataclass
@@ -76,7 +76,7 @@ class Placing:
         if rows == count or (rows < count and (by or self.mistakes) and self.missing_open):
             return found
         advice = "" if by else unused(self.table)
-        if rows < count and (by or any(map(is_index, self.table.others))):
+        if rows < count and (by or self.mistakes):
             advice = "; --missing-open claims that the others are open"
         elif rows > count and (not placed or len(np.unique(self.points, axis=0)) > count):
             advice += "; --nodes sums rows by asperity"
@@ -145,28 +145,20 @@ class Placing:
 
     def _numbered(self) -> Indices | None:
         """(m,) the asperity of each row, from an index; None if rows are in the scene's order."""
-        held = self.table.others
-        named = {name: cells for name, cells in held.items() if is_index(name)}
-        named = {"index": held["index"]} if "index" in self.table.called else named
-        found: dict[str, Indices] = {}
-        for name, cells in named.items():
-            index = self._indices(cells)
-            if not isinstance(index, str):
-                found[name] = index
-            elif bare(name).lower() in SURELY_INDEX or (
-                name and (self.missing_open or (np.diff(cells) < 0).any())
-            ):  # increasing numbers may be those of nodes
-                self.mistakes.append(f"column {name}: found {index}")
-        # A column that only counts the rows says nothing beside another index.
-        shuffled = {name: it for name, it in found.items() if (np.diff(it) != 1).any()}
-        for name, index in (shuffled or found).items():
-            for other, differs in shuffled.items():
-                if not np.array_equal(index, differs):
-                    said = f"found asperities {index[0]}, ... and {differs[0]}, ..."
-                    said = f"columns {name}, {other}: {said}, expected one index"
-                    self.mistakes.append(f"{said}: --column index=NAME")
-            first = int(named[name].min() > 0)
-            self.how = f"in the order of column {name or '1'}, from {first}"
+        held, found = self.table.others, dict[str, Indices]()
+        sure = ["index"] if "index" in self.table.called else SURELY_INDEX
+        for name, cells in held.items():
+            if bare(name).lower() in sure:
+                found |= self._indices(name, cells)
+            elif is_index(name) and cells.dtype.kind == "f" and (np.diff(cells) < 0).any():
+                found_it = f"column {name or '1'}: found {cells[0]:g}, {cells[1]:g}, ..."
+                right = f"increasing numbers, or --column index={quote(name or '1')}"
+                self.mistakes.append(f"{found_it}, expected {right}")
+        if len({tuple(index.tolist()) for index in found.values()}) > 1:
+            said = f"columns {', '.join(found)}: found other asperities in each"
+            self.mistakes.append(f"{said}, expected one index: --column index=NAME")
+        for name, index in found.items():
+            self.how = f"in the order of column {name}, from {int(held[name].min() > 0)}"
             return index
         if placed := {it[0].lower(): it for it in held if re.fullmatch(r"[xyXY][ _.(\[].*", it)}:
             ways = " ".join(f"--column {axis}={quote(it)}" for axis, it in sorted(placed.items()))
@@ -175,31 +167,29 @@ class Placing:
         self.how += unused(self.table, " (not used: {})")
         return None
 
-    def _indices(self, cells: NDArray[Any]) -> Indices | str:
-        """(m,) indices from 0, from a column that counts from 0 or 1; or what is wrong with it."""
+    def _indices(self, name: str, cells: NDArray[Any]) -> dict[str, Indices]:
+        """The index (m,) from 0 in a column that counts from 0 or 1; {} with a mistake if wrong."""
         rows, count = self.table.rows, len(self.scene)
         whole = np.zeros(len(cells), dtype=bool)
         if cells.dtype.kind == "f":
-            whole = (np.floor(cells) == cells) & (cells >= 0) & (cells < 2**53)
+            whole = (np.floor(cells) == cells) & (cells >= 0) & (cells <= count)
+        values, times = np.unique(cells, return_counts=True)
         if not whole.all():
             first = int(np.argmin(whole))
-            right = "whole numbers from 0 or 1; rename the column if rows are in order"
-            return f"{cells[first]} in {rows[first]}, expected {right}"
-        index = cells.astype(np.intp)
-        values, times = np.unique(index, return_counts=True)
-        first, most = min(int(values[0]), 1), int(values[-1])
-        if times.max() > 1:
-            twice = values[times.argmax()]
-            where = " and ".join(rows[i] for i in np.flatnonzero(index == twice)[:2])
-            return f"{twice} in {where}, expected each asperity once"
-        if most - first >= count:
-            last = f"{count - 1 + first}, the last asperity"
-            return f"{most}, expected at most {last}; or columns x and y"
-        if values[0] > 0 and most < count:
-            more = f"0, if they count from 0, or {count}, if they count from 1"
-            more += f": add this row with {self.column} 0"
-            return f"numbers from {values[0]} to {most}, expected also {more}"
-        return index - first
+            wrong = f"{cells[first]:g} in" if cells.dtype.kind == "f" else f"{cells[first]} in"
+            wrong += f" {rows[first]}, expected whole numbers up to {count}, from 0 or 1"
+        elif times.max() > 1:
+            twice = cells == values[times.argmax()]
+            where = " and ".join(rows[i] for i in np.flatnonzero(twice)[:2])
+            wrong = f"{values[times.argmax()]:g} in {where}, expected each asperity once"
+        elif (values[0] == 0) == (values[-1] == count):
+            wrong = f"numbers from {values[0]:g} to {values[-1]:g}, expected either 0, if they "
+            wrong += f"count from 0, or {count}, if they count from 1: add this row with "
+            wrong += f"{self.column} 0"
+        else:
+            return {name: cells.astype(np.intp) - int(values[0] > 0)}
+        self.mistakes.append(f"column {name}: found {wrong}")
+        return {}
 
     # By position
 
