@@ -109,13 +109,10 @@ def read(
                     _refuse_other_numbers(grid)
             else:
                 grid = map_arrays.instrument_map(path)
-        if grid.comments and (
-            (pixel is None and not grid.pixel) or not (height_unit or grid.height_unit)
-        ):
-            expected = (
-                "--pixel and --height-unit with a file that has other comments than Gwyddion's"
-            )
-            expected += " and the header of an ESRI grid, or names of columns as z [nm]"
+        stated = (pixel is not None or grid.pixel) and (height_unit or grid.height_unit)
+        if grid.comments and not stated:
+            expected = "comments of Gwyddion or of an ESRI grid alone, or also --pixel and "
+            expected += "--height-unit, or names of columns as z [nm]"
             raise InputError("comments", found=shortened(grid.comments[0]), expected=expected)
         length = one_unit("unit", unit, grid.unit)
         upwards = one_unit("height_unit", height_unit, grid.height_unit)

@@ -19,7 +19,7 @@ from convexrough.tabular import roles
 from convexrough.tabular.arrays import ARRAYS, read_arrays, reading
 from convexrough.tabular.roles import AS_IT_IS, COLUMNS, Reading, is_index, shortened
 from convexrough.tabular.text import HOLES, Cells, Style, read_cells
-from convexrough.tabular.units import bare, in_unit, unit
+from convexrough.tabular.units import bare, in_unit, parsed, unit
 
 #: Number of mistakes of one file that are shown; and largest difference of a last row from the
 #: means or sums of the other rows, over the range of each column, if it contains those.
@@ -107,7 +107,7 @@ def read_table(
             if "unit" in names[i].lower()]  # fmt: skip
     if cells is None and source.style.decimal:  # comments of maps are judged by `surface.read`
         said += [("comments", text) for text in source.comments]
-    stated = (*units, *how.scales)
+    stated = {name for name in units if parsed(units[name])} | how.scales.keys()
     unknown = [name for name in places if COLUMNS[name].kind and name not in stated]
     if said and unknown:  # what is said could name other units, or a factor
         name = in_unit(unknown[0], how.units.name(COLUMNS[unknown[0]].kind) or "UNIT")

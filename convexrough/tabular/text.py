@@ -153,7 +153,7 @@ class Cells(NamedTuple):
 def read_cells(path: Path, known: Sequence[str] = (), *, is_map: bool = False) -> Cells:
     """The cells of a text file or workbook. Raises FileError if the file is empty or not text.
 
-    known : names of columns, in lower case; a last comment with one of these can be the header
+    known : names of columns, in lower case; if half of a last comment are these, it is the header
     is_map : True for a map of heights: text above the numbers is a comment, unless it has as many
         cells as they, and empty cells may be holes
     """
@@ -194,8 +194,8 @@ def read_cells(path: Path, known: Sequence[str] = (), *, is_map: bool = False) -
     if comments and not header:
         last = comments[-1].lstrip("#% ").rstrip(",;\t ")
         for names in (_names(last, style), _APART.split(_UNIT_APART.sub("", last))):
-            wanted = any(bare(name).lower() in known for name in names)
-            if wanted and len(names) == _width(rows[0].cells):
+            wanted = sum(bare(name).lower() in known for name in names)
+            if 2 * wanted >= min(len(names), 4) and len(names) == _width(rows[0].cells):
                 header = [name.strip(",;") for name in names]
         comments = comments[:-1] if header else comments
     if is_map and not header:
