@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import product
 from typing import NamedTuple
 
 from convexrough.errors import InputError
@@ -125,14 +124,13 @@ def columns_key(named: Mapping[str, str], missing: Iterable[str]) -> str:
     return f"columns = {{{', '.join(pairs)}}} in [asperities]"
 
 
-def lookalikes(unread: Sequence[str], missing: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """Each name of a missing column, with that of an unread one that is similar."""
-    from difflib import SequenceMatcher  # only when a column is missing
+def lookalikes(unread: Sequence[str], missing: Sequence[str]) -> dict[str, str]:
+    """By name of a missing column, an unread one with a similar name."""
+    from difflib import get_close_matches  # only when a column is missing
 
-    for name, each in product(unread, missing):
-        alike = SequenceMatcher(None, name.lower(), each).ratio()
-        if LOOKS_LIKE < alike < 1:  # 1: assigned otherwise by `Reading.columns`
-            yield each, name
+    left = [each for each in unread if each.lower() not in missing]  # else named by `Reading`
+    alike = [(get_close_matches(each.lower(), missing, 1, LOOKS_LIKE), each) for each in left]
+    return {near[0]: each for near, each in alike if near}
 
 
 def factors_of(

@@ -145,8 +145,8 @@ def _unnamed(
 ) -> Iterator[str]:
     """A mistake for each missing column, and for each unread one whose name is like a wanted."""
     left = [bare(name) for i, name in enumerate(source.header or []) if i not in places.values()]
-    others = [name for name in left if not is_index(name)]
-    similar = dict(roles.lookalikes(left, wanted))
+    others = [name for name in left if not is_index(name) and len(name) < 40]
+    similar = roles.lookalikes(left, wanted)
     key = roles.columns_key({**how.columns, **similar}, missing)
     key = f", or {key}" if how.keyed and source.header else ""
     for name in (name for name in missing if name not in how.columns):

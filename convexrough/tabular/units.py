@@ -164,12 +164,7 @@ class UnitNames(NamedTuple):
 
     def unit(self, kind: str) -> Unit | None:
         """The scene's unit of "length", "force", "area" or "pressure"; None if it is not named."""
-        length, force = map(parsed, self)
-        if kind == "area" and length:
-            return (length**2)._replace(name=self.name(kind))
-        if kind == "pressure" and length and force:
-            return (force * length**-2)._replace(name=self.name(kind))
-        return {"length": length, "force": force}.get(kind)
+        return parsed(self.name(kind))
 
     def name(self, kind: str) -> str:
         """The name of the unit of "length", "force", "area", "pressure", "work" or "stiffness"; ""
