@@ -105,10 +105,11 @@ def read_table(
     rest = [i for i in range(len(names)) if i not in (index, *places.values())]
     said = [(f"column {names[i]}", str(source.columns[i][0])) for i in rest
             if "unit" in names[i].lower()]  # fmt: skip
-    if cells is None and source.style.decimal:  # comments of maps are judged by `surface.read`
-        said += [("comments", text) for text in source.comments]
     stated = {name for name in units if parsed(units[name])} | how.scales.keys()
     unknown = [name for name in places if COLUMNS[name].kind and name not in stated]
+    if not said and cells is None and source.style.decimal:  # `surface.read` judges those of maps
+        said = [("comments", text) for text in source.comments]
+        unknown = [name for name in unknown if how.units.unit(COLUMNS[name].kind)]
     if said and unknown:  # what is said could name other units, or a factor
         name = in_unit(unknown[0], how.units.name(COLUMNS[unknown[0]].kind) or "UNIT")
         where, text = said[0]

@@ -82,6 +82,8 @@ def _size(claim: Claim) -> str:
     if most > 0 == claim.largest:
         size = f"{bound(most)} {claim.of.units.force}".rstrip()
         return f"{size} while the largest {'' if smaller else 'given '}{which} is 0"
+    if math.isinf(claim.error):  # of tiny loads
+        return f"more than the largest {which}"
     shown = float(bound(claim.error))
     if claim.near_enough:
         shown = min(shown, claim.within)
