@@ -16,13 +16,10 @@ from convexrough import checks, solvers
 from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.cached import Cached
-from convexrough.convex.newton_step import correct
 from convexrough.errors import InputError, ProofError, SolverError
 from convexrough.influence import Influence, Kind
 from convexrough.influence.choice import couple
-from convexrough.influence.shells import shells
 from convexrough.normal.certificate import MOST_KEPT, Certificate, certificate_of, certify_on
-from convexrough.normal.exact import Units
 from convexrough.normal.level import Level
 from convexrough.normal.levels import Levels
 from convexrough.normal.problem import NormalProblem
@@ -32,7 +29,6 @@ from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
 from convexrough.record import Along, Table
 from convexrough.roundoff import AT_THE_END, ROUNDOFF
-from convexrough.scene.base import along
 from convexrough.scene.scene import Scene
 from convexrough.solvers import Solution, Solver
 from convexrough.sphere import hertz
@@ -443,47 +439,6 @@ def covered(scene: Scene, radii: Array) -> int:
     points = scene.contact_points
     under = cKDTree(points[summits]).query_ball_point(points[discs], radii[discs])
     return len({int(i) for each in under for i in each})
-
-
-def closest_changes(contact: Contact) -> Array:
-    """(n,) [force] first-order changes of loads from the geometry "summit" to "closest".
-
-    The approach is constant; the changes are 0 if the geometry is "closest" already. In it an
-    asperity of tip radius rho at the distance r from the axis touches a sphere of radius R at the
-    distance r R / (R + rho). Its offset (`Scene.offsets`) is greater by r^2 rho / (2 R (R + rho)).
-    Distances between contact points are smaller by a fraction of about rho / R, and compliances
-    greater. With the compliance operator A, the changes of loads dP satisfy
-
-        (H + A) dP = r^2 rho / (2 R (R + rho)) - (rho / R) A P,
-
-    where H = (2/3) indentation / P is the local part of the Hessian. If the body has two principal
-    radii, the terms of x and y are added.
-    """
-    scene, touching = contact.scene, np.flatnonzero(contact.loads)
-    gains = np.zeros(len(scene))
-    if scene.geometry == "closest" or len(touching) == 0:
-        return frozen(gains)
-    k = hertz.local_coefficient(scene.material.contact_modulus, scene.relative_radii[touching])
-    loads, rho = contact.loads[touching], scene.asperities.tip_radii[touching]
-    indentations = hertz.indentation(loads, k)
-    units = Units.of(float(indentations.max()), float(np.median(k)))
-    scale = units.force / units.length / (np.pi * scene.material.contact_modulus)
-    A = couple(scene, touching, scale, contact.influence)
-    slopes = 1.5 * (loads / units.force) / (indentations / units.length)
-    lift = np.zeros(len(touching))
-    for R, axes in scene.curved:
-        squares = (scene.asperities.positions[touching, axes] ** 2).sum(axis=1)
-        lift += squares * rho / (2.0 * R * (R + rho)) / units.length
-    radii = along(scene.sphere_radius)
-    if radii[0] == radii[1]:
-        nearer = rho / radii[0] * A.apply(loads / units.force)
-    else:
-        moved = -scene.asperities.positions[touching] * rho[:, None] / np.array(radii)
-        nearer = turned(A, moved, loads / units.force)
-    deeper = lift - nearer
-    change = correct(A, shells(A), np.sqrt(slopes), -deeper, balanced=False, tolerance=1e-3)
-    gains[touching] = slopes * change * units.force
-    return frozen(gains)
 
 
 def turned(A: Influence, moved: Array, loads: Array) -> Array:

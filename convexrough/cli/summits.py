@@ -162,17 +162,4 @@ def summits(
         common.say_aside(
             "hint", "use --scene or --radius to press on the summits and choose --prune"
         )
-    if how.scene is not None and (other := _other_table(how.scene, folder / "summits.csv")):
-        table = folder / new.files[0].name
-        common.say_aside("hint", f"{how.scene} reads {other}, and this run wrote {table}")
     return common.DONE if scanned.certified else common.NOT_CERTIFIED
-
-
-def _other_table(scene: Path, table: Path) -> str:
-    """The table of asperities that a scene file names, if it is not `table`; else ""."""
-    from convexrough.run.scene_file import read_study
-
-    layout = read_study(scene)[0].asperities
-    if layout.pattern != "file" or (scene.parent / layout.path).resolve() == table.resolve():
-        return ""
-    return str(scene.parent / layout.path)

@@ -43,9 +43,6 @@ SCHEMA, MOST_CSV_ROWS = 2, 100_000
 #: The file that lists the files written and, for some commands, files read and versions.
 MANIFEST = "files.json"
 
-#: A folder with both contains a sweep.
-SWEEP_MANIFEST, SWEEP_PARTS = "manifest.json", "parts"
-
 #: Results may depend on the versions of these packages.
 NUMERICAL = ("numpy", "scipy", "clarabel", "cvxpy", "osqp")
 
@@ -160,7 +157,7 @@ def results_folder(
 ) -> Iterator[Writer]:
     """A context manager that yields a writer; its files are in `folder` if the body succeeds.
 
-    force : True to accept a folder with contents; results of another command are refused even then
+    force : True to accept a folder with contents
     reads : files that the block reads; they must not be in `folder`
     formats, dpi : as for `Writer`;  command, said : entries of `files.json`
 
@@ -169,7 +166,6 @@ def results_folder(
     """
     there = folder.is_dir()
     new = unfinished(folder / "results" if there else folder)
-    parents = [each for each in folder.parents if not each.exists()]
     with file_errors(folder, "hold results"):
         folder.parent.mkdir(parents=True, exist_ok=True)
         remove_unfinished(folder if there else folder.parent)
@@ -183,7 +179,7 @@ def results_folder(
         if there and any(folder.iterdir()) and not force:
             advice = "--force replaces its results; or name another folder"
             raise FileError(f"{folder}: not empty; {advice}")
-        refuse_others(folder, command)
+        _listed(folder)
         new.mkdir()
         try:
             yield Writer(folder, new, formats, dpi)
@@ -197,41 +193,31 @@ def results_folder(
                 os.replace(new, folder)
         finally:
             shutil.rmtree(new, ignore_errors=True)
-            for each in parents:
-                with suppress(OSError):  # not empty: it holds results
-                    each.rmdir()
-
-
-def refuse_others(folder: Path, command: str) -> None:
-    """Raise FileError if the folder has results of another command, or a damaged `files.json`."""
-    if (earlier := _manifest(folder).get("command", command)) != command:
-        raise FileError(f"{folder}: holds results of `{earlier}`; name another folder")
 
 
 def remove_earlier(folder: Path) -> None:
     """Remove `files.json` from the folder, and then the files that it lists."""
-    files = _manifest(folder).get("files", [])
-    for name in [MANIFEST, *map(str, files)]:
-        path = folder / Path(name).name  # only the name: inside the folder, even for "../x"
+    for name in [MANIFEST, *_listed(folder)]:
+        path = folder / name
         if path.is_file() or path.is_symlink():
             path.unlink()
 
 
-def _manifest(folder: Path) -> dict[str, Any]:
-    """The contents of `files.json` in a folder; {"command": "sweep"} for a sweep; otherwise {}.
+def _listed(folder: Path) -> list[str]:
+    """The names of the files that `files.json` lists, without folders such as "../"; [] without it.
 
     Raises FileError if `files.json` is damaged, because then the earlier files are unknown.
     """
     path = folder / MANIFEST
     if not path.exists():
-        sweep = (folder / SWEEP_MANIFEST).exists() and (folder / SWEEP_PARTS).is_dir()
-        return {"command": "sweep"} if sweep else {}
-    with file_errors(path, "be read"), suppress(ValueError):
-        found = json.loads(path.read_text(encoding="utf-8"))
-        if isinstance(found, dict) and isinstance(found.get("files"), list):
-            return found
-    expected = "expected the list of the files of an earlier run; remove it or name another folder"
-    raise FileError(f"{path}: damaged, {expected}")
+        return []
+    with file_errors(path, "be read"):
+        try:
+            names = json.loads(path.read_text(encoding="utf-8"))["files"]
+            return [Path(name).name for name in names]
+        except (ValueError, KeyError, TypeError) as error:
+            expected = "expected a list of files; remove it or name another folder"
+            raise FileError(f"{path}: damaged, {expected}") from error
 
 
 def origin(source: SceneFile) -> Summary:

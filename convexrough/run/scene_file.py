@@ -146,9 +146,6 @@ def read_scene(path: str | os.PathLike[str], *, asperities: Asperities | None = 
     layout, sources = study.asperities, [path]
     if layout.pattern == "file" and asperities is None:
         sources.append(path.parent / layout.path)
-    for stage in study.stages.values():
-        with blamed_on(path):
-            stage.fits(len(task.scene))
     return SceneFile(
         **vars(task),
         path=path,

@@ -7,7 +7,6 @@ result.
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -53,33 +52,18 @@ KINDS = {
 }  # fmt: skip
 KIND = {name: kind for kind, names in KINDS.items() for name in names}
 
-#: A stage gets a warning if its largest load differs from the load of [normal] by more than the
-#: factor FAR, or if its largest shear force is below the fraction SLIGHT of the friction limit.
-FAR, SLIGHT = 100.0, 2e-3
-
 #: Largest number of printed rows of a table of steps.
 MOST_PRINTED = 20
 
 
 def cautions(stages: Iterable[Stage], contact: Contact) -> Iterator[str]:
-    """Warnings about stages that do not fit the contact, and about the model at their largest load,
-    if this is larger than the load of the contact, of kinds that do not concern the contact."""
-    stages = list(stages)
-    for stage in stages:
-        yield from stage.cautions(contact)
+    """Warnings about the contact at the largest load of a stage, if that exceeds `contact.load`."""
     highest = max(stages, key=lambda stage: stage.highest_load, default=None)
     if highest is not None and highest.highest_load > contact.load:
         with suppress(ConvexroughError):  # `compute` raises it
             top = press(contact.scene, load=highest.highest_load, influence=contact.influence)
-            said = {_kind(each) for each in cautions_of(contact)}
             for each in cautions_of(top):
-                if _kind(each) not in said:
-                    yield f"under the largest load of [{highest.name}]: {each}"
-
-
-def _kind(warning: str) -> str:
-    """The warning without its numbers."""
-    return re.sub(r"[\d.,]+(e[-+]?\d+)?", "", warning)
+                yield f"under the largest load of [{highest.name}]: {each}"
 
 
 class Stage(FileTable):
@@ -102,27 +86,6 @@ class Stage(FileTable):
         """[force] the largest load in the table; 0 if the stage uses the load of [normal]."""
         return 0.0
 
-    @property
-    def highest_force(self) -> float:
-        """[force] the largest shear force that the table gives as a force, not as a fraction."""
-        return 0.0
-
-    def cautions(self, contact: Contact) -> Iterator[str]:
-        """Warnings about loads and shear forces that are implausible for the pressed contact."""
-        load, name, known = self.highest_load, f"[{self.name}]", contact.load
-        if not load:
-            return
-        if known and not 1 / FAR <= load / known <= FAR:
-            yield (
-                f"{name} has loads up to {load:.4g}, and [normal] has the load {known:.4g}: check "
-                f"the units in both tables, and the key `reference` of {name}"
-            )
-        if 0 < self.highest_force < SLIGHT * checks.friction(contact.scene.friction) * load:
-            yield (
-                f"{name} has shear forces up to {self.highest_force:.4g}, less than {SLIGHT:g} of "
-                "the friction limit at the largest load: check the units of the forces"
-            )
-
     @classmethod
     def sheared_by(cls, keys: Any) -> str:
         """What needs [friction] if the stage has these keys, for messages; "" if nothing does."""
@@ -131,9 +94,6 @@ class Stage(FileTable):
     def compute(self, contact: Contact) -> Result:
         """The result of this stage for a pressed contact. Raises InputError and SolverError."""
         raise NotImplementedError
-
-    def fits(self, count: int) -> None:
-        """Raise InputError if the stage is not possible with this number of asperities."""
 
 
 def limit(contact: Contact) -> float:

@@ -41,11 +41,7 @@ class Material:
         hardness: float | None = None,
         *,
         mismatch: float = 0.0,
-        youngs_modulus: None = None,
     ) -> None:
-        if youngs_modulus is not None:
-            expected = "a contact_modulus; Material.from_youngs(modulus, poisson_ratio) converts"
-            raise InputError("youngs_modulus", found=youngs_modulus, expected=expected)
         self.__dict__.update(
             contact_modulus=checks.positive("contact_modulus", contact_modulus),
             poisson_ratio=checks.between("poisson_ratio", poisson_ratio, 0.0, 0.5),

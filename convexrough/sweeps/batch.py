@@ -52,10 +52,9 @@ class Tables:
         found: Columns = {}
         for key in self.grid.keys:
             values = [point[key] for point, _ in points]
-            if all(isinstance(it, (int, float)) for it in self.grid.axes.get(key, ())):
-                found[key] = np.array(values, dtype=np.float64)
-            else:  # a list as text
-                found[key] = np.array([it if isinstance(it, str) else repr(it) for it in values])
+            numeric = all(isinstance(it, (int, float)) for it in self.grid.axes.get(key, ()))
+            text = [it if isinstance(it, str) else repr(it) for it in values]  # a list as text
+            found[key] = np.array(values, np.float64) if numeric else np.array(text)
         seeds = [known if seed is None else seed for _, seed in points]
         return found | {"seed": np.array(seeds, dtype=np.int64)}
 

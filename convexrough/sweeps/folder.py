@@ -21,10 +21,10 @@ import numpy as np
 
 from convexrough.atomic import to_json, write_text
 from convexrough.errors import FileError, file_errors, needed
-from convexrough.run.results import SWEEP_MANIFEST, SWEEP_PARTS, refuse_others, remove_earlier
+from convexrough.run.results import remove_earlier
 from convexrough.sweeps.batch import Columns, different
 
-MANIFEST, PARTS, SCHEMA = SWEEP_MANIFEST, SWEEP_PARTS, 3
+MANIFEST, PARTS, SCHEMA = "manifest.json", "parts", 3
 
 #: Advice in messages: an argument in Python, and the option of the command in brackets.
 RESUME, OVERWRITE, OUT = "resume=True (--resume)", "overwrite=True (--force)", "`out` (--out)"
@@ -116,15 +116,12 @@ class Folder:
                 todo.append(part)
                 damaged += 1
         todo.sort(key=lambda part: part.start)
-        mine = {self.file(part.start).name for part in todo}
-        left = 0
+        mine = {f".{self.file(part.start).name}" for part in todo}
         for path in (self.path / PARTS).glob(".*.unfinished"):
-            if path.name[1:].rsplit(".", 2)[0] in mine:
+            if path.name.rsplit(".", 2)[0] in mine:
                 path.unlink(missing_ok=True)
-                left += 1
         said = f"found {count - sum(map(len, todo)):,} scenes of an earlier run"
-        said += f", damaged parts removed: {damaged:,}" if damaged else ""
-        return todo, said + (f", unfinished files removed: {left:,}" if left else "")
+        return todo, said + (f", damaged parts removed: {damaged:,}" if damaged else "")
 
 
 def open_folder(path: Path) -> Folder:
@@ -153,34 +150,23 @@ def make_folder(path: Path, manifest: Mapping[str, Any], *, overwrite: bool = Fa
     """
     arrow()
     with file_errors(path, "hold results"):
-        if overwrite and (path / MANIFEST).exists():
+        path.mkdir(parents=True, exist_ok=True)
+        if not (there := (path / MANIFEST).exists()):
+            # Meanwhile another process may begin this sweep.
+            names = (each.name for each in path.iterdir())
+            if other := next((it for it in names if it != PARTS and MANIFEST not in it), ""):
+                raise FileError(f"{path}: holds {other}, but no sweep; {OUT} names another folder")
+        elif overwrite:
             open_folder(path)  # raises FileError if it is not a sweep
-            refuse_others(path, "sweep")
             remove_earlier(path)  # of `sweep --summary`
+        if overwrite or not there:
             write_text(path / MANIFEST, to_json(manifest) + "\n")
-        if not (path / MANIFEST).exists():
-            path.mkdir(parents=True, exist_ok=True)
-            # Meanwhile another process may write the manifest of this sweep or of another sweep.
-            names = [each.name for each in path.iterdir() if each.name not in (PARTS, MANIFEST)]
-            orphans = any((path / PARTS).glob("*.parquet"))
-            for name in names:
-                if not name.startswith(f".{MANIFEST}"):
-                    said = f"holds {name}, but no sweep; {OUT} names another folder"
-                    raise FileError(f"{path}: {said}")
-            if not (path / MANIFEST).exists():
-                if orphans:  # the manifest, which is written before all parts, was removed
-                    raise FileError(
-                        f"{path}: contains parts of an unknown sweep, without {MANIFEST}: restore "
-                        f"this file or remove {path / PARTS}; {OUT} names another folder"
-                    )
-                (path / PARTS).mkdir(exist_ok=True)
-                write_text(path / MANIFEST, to_json(manifest) + "\n")
+        (path / PARTS).mkdir(exist_ok=True)
         folder = folder_of(path, manifest)
-        name = f"{'[0-9]' * 12}-{'[0-9a-f]' * 12}.parquet"
-        for pattern in (name, f".{name}.*.unfinished"):
-            for file in (path / PARTS).glob(pattern):
-                if folder.ending not in file.name:  # of another sweep
-                    file.unlink(missing_ok=True)
+        for file in (path / PARTS).glob("*-????????????.parquet*"):
+            of_another = folder.ending not in file.name
+            if of_another and file.suffix in (".parquet", ".unfinished"):
+                file.unlink(missing_ok=True)
     return folder
 
 

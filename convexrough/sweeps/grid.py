@@ -30,14 +30,8 @@ Law = Literal["uniform", "normal", "lognormal"]
 
 
 def _different(values: Any) -> bool:
-    """True for a list in which no value is twice, where 1 and 1.0 are the same."""
-
-    def hashable(value: Any) -> Any:
-        if isinstance(value, (list, tuple)):
-            return tuple(map(hashable, value))
-        return value if type(value) in (int, float) else repr(value)
-
-    return bool(values) and len({*map(hashable, values)}) == len(values)
+    """True for a list in which no value is twice."""
+    return 0 < len({*map(repr, values)}) == len(values)
 
 
 def _are_seeds(seeds: int | list[int]) -> bool:

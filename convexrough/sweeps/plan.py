@@ -156,38 +156,32 @@ def plan_of_scenes(
     if not measures or not all(isinstance(name, str) for name in measures):
         raise InputError("measure", found=checks.shown(measures), expected=expected)
     measures = list(dict.fromkeys(measures))
-    content = hashlib.sha256()
-    for scene in scenes:
-        layout, material = scene.asperities, scene.material
+    content, tasks = hashlib.sha256(), dict[int, Task]()
+    common: Any = {"approach": None, "load": None, "stages": stages, "solver": Newton()}
+    for number, (scene, control) in enumerate(zip(scenes, controls, strict=True)):
+        layout = scene.asperities
         for values in (layout.positions, layout.tip_radii, layout.heights):
             content.update(values.tobytes())
-        numbers = (scene.sphere_radius, material, scene.friction)
+        numbers = (scene.sphere_radius, scene.material, scene.friction)
         content.update(f"{numbers}{scene.geometry} {len(scene)}".encode())
+        tasks[number] = Task(scene=scene, **common | {name: control})
     given = {"scenes": content.hexdigest(), name: controls, "stages": repr(stages)}
-    common: Any = {"approach": None, "load": None, "stages": stages, "solver": Newton()}
-    tasks = {
-        number: Task(scene=scene, **common | {name: control})
-        for number, (scene, control) in enumerate(zip(scenes, controls, strict=True))
-    }
     said = {"source": "scenes made in Python"}
     return _planned(Tasks(tasks, name), measures, said, UnitNames(), **given)
 
 
 def _stages(cycle: Sequence[float], shear: Sequence[float]) -> Stages:
     found: dict[str, Stage] = {"normal": NormalStage(approach=0.0)}
-    mistakes: list[str] = []
     models: list[tuple[type[Stage], str, Sequence[float]]]
     models = [(ShearStage, "fractions", shear), (CycleStage, "maximum_fraction", cycle)]
     for model, key, values in models:
         checks.sequence(model.name, values, "a list of fractions of f P")
         if len(values):
             given = checks.array(model.name, values).tolist()
-            table, wrong = validate_table(model.name, {key: given}, model)
-            mistakes += wrong
-            if table is not None:
-                found[model.name] = table
-    if mistakes:
-        raise MistakesError("sweep", mistakes)
+            table, mistakes = validate_table(model.name, {key: given}, model)
+            if table is None:
+                raise MistakesError("sweep", mistakes)
+            found[model.name] = table
     return found
 
 
@@ -223,10 +217,6 @@ def _planned(
     columns = tuple(it for it in columns if it.name not in labels)  # a swept key has a column
     numbers = {key: key for key in labels} | {it.name: it.number for it in columns}
     used = {"normal", *(column.stage for column in columns)}
-    own_loads = []  # tables with loads of their own that do not vary, although [normal] does
-    if grid and {"normal.load", "normal.approach"} & {*labels}:
-        own = [name for name, stage in asked.stages.items() if name in used and stage.highest_load]
-        own_loads = [it for it in own if not any(key.startswith(f"{it}.") for key in labels)]
     manifest = {
         "schema": SCHEMA,
         "version": __version__,
@@ -237,7 +227,6 @@ def _planned(
         "columns": ["scene", *labels, "status", "message", *(it.name for it in columns)],
         "drawn": [*grid.draw] if grid else [],
         "not_measured": [name for name in asked.stages if name not in used],
-        "own_loads": own_loads,
         "units": {name: it for name, end in numbers.items() if (it := unit(end, units))},
         **said,
         "versions": VERSIONS,

@@ -63,14 +63,9 @@ def describe_quantiles(found: Columns) -> list[str]:
 
 
 def cautions(table: SweepTable) -> Iterator[str]:
-    """Warnings: the messages of the first `MOST_NAMED` scenes that failed, stages with loads of
-    their own, and the first messages of undecided and of certified scenes."""
+    """Warnings: the messages of the first `MOST_NAMED` scenes that failed, and the first messages
+    of undecided and of certified scenes."""
     yield from islice(_messages(table, "failed"), MOST_NAMED)
-    for name in table.manifest.get("own_loads", []):  # manifests of earlier versions lack it
-        yield (
-            f"[{name}] has its own loads, which do not vary with the load of [normal]: sweep them, "
-            f"or their factor {name}.reference, together with that load in [sweep.together]"
-        )
     for status, what in (("undecided", ""), ("certified", " with warnings")):
         said = _messages(table, status)
         if first := next(said, ""):

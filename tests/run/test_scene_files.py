@@ -91,9 +91,9 @@ def test_what_is_only_checked_is_not_certified(read: Any) -> None:
 def test_an_array_for_the_largest_load_of_a_path(read: Any) -> None:
     """The pattern is wide enough for loads above that of [normal]; too narrow ones are told."""
 
-    def run(within: str, low: str = "3e-8", high: str = "1.2e-6", radius: str = "1.0") -> Any:
-        path = FRICTION + f"[path]\nloads = [{high}, {high}]\nforces = [0.0, 1e-8]\n"
-        scene = read(HEXAGONAL + within, f"load = {low}", path, radius)
+    def run(within: str) -> Any:
+        path = FRICTION + "[path]\nloads = [1.2e-6, 1.2e-6]\nforces = [0.0, 1e-8]\n"
+        scene = read(HEXAGONAL + within, "load = 3e-8", path)
         contact = scene.press()
         return contact, scene.compute(contact)[1].found[0], list(scene.cautions(contact))
 
@@ -104,10 +104,6 @@ def test_an_array_for_the_largest_load_of_a_path(read: Any) -> None:
     *_, narrow = run("within = 0.0067")
     under = "under the largest load of [path]: "
     assert [each for each in narrow if under + "contact reaches the rim" in each]
-    long = "within = 0.0102\nheight_std = 2e-6\nseed = 3"
-    for low, ended in (("1e-9", True), ("4e-8", False)):  # at 4e-8 [normal] has warned of it
-        *_, said = run(long, low, "5e-8", "[inf, 1.0]")
-        assert any(each.startswith(under + "contact reaches the ends") for each in said) == ended
 
 
 def test_every_warning_at_the_largest_load_of_a_path(read: Any) -> None:
@@ -170,8 +166,9 @@ def test_what_is_written_and_printed(run: Any) -> None:
     np.testing.assert_array_equal(table["by_height_error"], gradient.height_errors)
     np.testing.assert_array_equal(table["by_y"], gradient.positions[:, 1])
     assert summary["by"]["contact_modulus"] == gradient.contact_modulus
-    assert summary["largest_by_height"] == gradient.heights[summary["largest_at"]]
-    assert abs(summary["largest_by_height"]) == np.abs(gradient.heights).max()
+    most = summary["largest"]["heights"]
+    assert most["slope"] == gradient.heights[most["asperity"]]
+    assert abs(most["slope"]) == np.abs(gradient.heights).max()
     lines = printed(outcome.out)
     for name, slope in summary["by"].items():
         assert lines[f"by {name}"] == f"{slope + 0.0:.8g}"
@@ -191,8 +188,7 @@ def test_what_is_written_and_printed(run: Any) -> None:
 def test_where_there_is_none(run: Any) -> None:
     """All else is computed and written; what is missing is said, and the status says so."""
     keys = 'of = "loss"\nfraction = 1.0\nholding = "approach"'
-    said = "[gradient] fraction: found 1, a force of 1.804266945e-07: gross sliding, expected a "
-    said += "force below f P: at constant approach f P may fall below the force"
+    said = "maximum: found 1.804266945e-07: gross sliding, expected a force below f P"
     text = scene(f"[gradient]\n{keys}\n[cycle]\nmaximum_fraction = [0.5]\n")
     outcome = run(text, "--out", "out")
     assert outcome.status == 3
@@ -250,7 +246,7 @@ def test_a_whole_run(run: Any, command: Any, radius: str) -> None:
     assert outcome.status == 0, outcome.err
     assert "Dundurs' beta = -0.117, neglected" in outcome.out
     smooth = radius == "[1.0, 2.5]"
-    assert ("smooth W/W0" in outcome.out) == smooth
+    assert ("no W/W0" in outcome.out) != smooth
     assert ("no smooth reference" in outcome.out) != smooth
     summary = json.loads(Path("a-results/summary.json").read_text())
     assert summary["normal"]["mismatch"] == pytest.approx(-0.1167, abs=1e-4)
@@ -337,7 +333,7 @@ MISTAKES = [
     (stage(f"{LOOPS}points = 3"),
      "[cycle] loop_points: found 3, expected a whole number, at least 4"),
     (stage(f"{LOOPS}asperities = [61]"),
-     "[cycle] loop_asperities[0]: found 61, expected an index from 0"),
+     "[cycle] loop_asperities: asperities: found [61], expected whole numbers from 0 to"),
     (stage("[path]\nloads = [1e-7]\nforces = [0.0, 0.0]"),
      "[path] loads, forces: found 1 and 2 values"),
     (stage("[path]\nloads = [1e-7]\nforces = [1e-7]"), "[path]: forces[0]"),

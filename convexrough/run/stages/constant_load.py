@@ -12,7 +12,7 @@ from pydantic import Field
 
 from convexrough import plots
 from convexrough.contact import Contact
-from convexrough.errors import InputError, blamed_on
+from convexrough.errors import blamed_on
 from convexrough.friction.cycle import Loop, loops
 from convexrough.friction.fretting import Fretting, fretting, fretting_columns
 from convexrough.friction.path import history
@@ -125,14 +125,6 @@ class CycleStage(Stage):
                 expected = f"expected a number above its minimum, {low + 0.0:g}"
                 yield f"maximum_fraction[{i}]", f"found {high}, {expected}"
 
-    def fits(self, count: int) -> None:
-        """Check that the asperities of `loop_asperities` exist. Raises InputError."""
-        asked = self.loop_asperities
-        for place, index in enumerate(asked if isinstance(asked, list) else ()):
-            if index >= count:
-                what = f"[cycle] loop_asperities[{place}]"
-                raise InputError(what, found=index, expected=f"an index from 0 to {count - 1}")
-
     def compute(self, contact: Contact) -> CycleResult:
         if self.displacement:
             with blamed_on("[cycle]"):
@@ -179,7 +171,8 @@ class CycleResult(Result):
             distances = contact.scene.asperities.distances
             chosen = one_of_each_ring(distances, contact.loads, MOST_LOOPS)
         points = stage.loop_points or affordable
-        return loops(self.found, points, None if chosen == "all" else chosen)
+        with blamed_on("[cycle] loop_asperities"):
+            return loops(self.found, points, None if chosen == "all" else chosen)
 
     @cached_property
     def worn(self) -> list[Fretting]:
@@ -201,23 +194,13 @@ class CycleResult(Result):
         return {**super().tables(), "loop": curves, "fretting": worn}
 
     def headings(self) -> Mapping[str, str]:
-        """The headings of columns in the rows, without W/W0 if there is no smooth reference, and
-        without numbers of undecided asperities if all are 0.
-        """
-        row, left_out = self.known[0], set[str]()
-        if math.isnan(row["smooth_normalised"]):
-            left_out |= {"loss_normalised", "smooth_normalised"}
-        if not any(each["undecided"] for each in self.known):
-            left_out.add("undecided")
-        return {it: head for it, head in self.printed.items() if it in row and it not in left_out}
+        """The headings of columns in the rows."""
+        return {name: head for name, head in self.printed.items() if name in self.known[0]}
 
     def lines(self) -> list[str]:
-        if "loss_normalised" in self.headings():
-            said = "W0: six times the smooth body's W at the onset of gross sliding"
-            return [*super().lines(), said]
-        bodies = "a flat or a cylinder has no smooth reference"
-        why = bodies if self.contact.load else "no asperity carries a load"
-        return [*super().lines(), f"no W/W0: {why}"]
+        said = "W0: six times the smooth body's W at the onset of gross sliding"
+        none = math.isnan(self.known[0]["smooth_normalised"])
+        return [*super().lines(), "no W/W0: no smooth reference" if none else said]
 
     def figures(self) -> Mapping[str, Any]:
         widest = max(self.worn, key=lambda each: each.maximum - each.minimum)

@@ -74,11 +74,7 @@ class GradientStage(Stage):
             gradient = gradient_of(contact, self.of, force, self.holding)
             return GradientResult(self, contact, (gradient,))
         except (InputError, SolverError) as error:
-            why = error
-            if isinstance(error, InputError) and error.what in ("force", "maximum"):
-                found = f"{self.fraction:g}, a force of {error.found}"
-                why = InputError("[gradient] fraction", found=found, expected=error.expected)
-            return GradientResult(self, contact, (), str(why))
+            return GradientResult(self, contact, (), str(error))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -100,15 +96,12 @@ class GradientResult(Result):
             sizes = np.linalg.norm(slopes, axis=1) if slopes.ndim == 2 else np.abs(slopes)
             at = int(np.argmax(sizes))
             largest[name] = {"slope": slopes[at].tolist(), "asperity": at}
-        most = int(np.argmax(np.abs(gradient.heights)))
         return [{
             "of": asked.of,
             **({"fraction": asked.fraction} if asked.sheared else {}),
             "holding": gradient.holding,
             "value": gradient.value,
             "by": {name: it for name in SHARED if (it := getattr(gradient, name)) is not None},
-            "largest_by_height": float(gradient.heights[most]),
-            "largest_at": most,
             "largest": largest,
             "height_error": float(gradient.height_errors.max()),
             "balance_defect": gradient.balance_defect,

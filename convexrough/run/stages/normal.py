@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from convexrough import plausibility, plots
 from convexrough.arrays import Array
-from convexrough.contact import Contact, closest_changes
-from convexrough.errors import SolverError
+from convexrough.contact import Contact, press
+from convexrough.errors import InputError, SolverError
 from convexrough.normal.certificate import Certificate
 from convexrough.run.stage import Columns, Result, Stage, Summary, numbers, unit_of
 from convexrough.run.values import Finite, Positive
@@ -96,15 +97,16 @@ def judged_loads(certificate: Certificate, loads: Array) -> Summary:
 def limits_of(contact: Contact) -> Summary:
     """Measures of the validity of the model: those of `plausibility.limits_of` and two others.
 
-    closest_change : largest relative change of loads of at least `HEAVY` of the largest load if the
-        geometry becomes "closest"; None if it is so already, if nothing touches, or if not known
+    closest_change : largest relative change of loads of at least `HEAVY` of the largest load at the
+        same approach, if the geometry is "closest"; None if it is so already, or if not known
     """
-    scene, change = contact.scene, None
-    if scene.geometry == "summit" and contact.loads.any():
-        heavy = contact.loads >= HEAVY * contact.loads.max()
-        with suppress(SolverError):
-            changes = closest_changes(contact)[heavy] / contact.loads[heavy]
-            change = float(np.abs(changes).max())
+    scene, loads, change = contact.scene, contact.loads, None
+    if scene.geometry == "summit" and loads.any():
+        heavy = loads >= HEAVY * loads.max()
+        with suppress(InputError, SolverError):
+            closest = replace(scene, geometry="closest")
+            other = press(closest, approach=contact.approach, start=loads).loads
+            change = float(np.abs(other[heavy] / loads[heavy] - 1.0).max())
     own = {"geometry": scene.geometry, "closest_change": change}
     return plausibility.limits_of(contact) | own
 

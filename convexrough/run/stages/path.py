@@ -66,12 +66,6 @@ class _Points(Stage):
             return self.reference * (it.load + abs(it.load_amplitude))
         return self.reference * max(self.loads or [0.0])
 
-    @property
-    def highest_force(self) -> float:
-        if (it := self.ellipse) is not None:
-            return self.reference * (abs(it.force) + abs(it.force_amplitude))
-        return self.reference * max(map(abs, self.forces or [0.0]))
-
     def points(self, contact: Contact) -> dict[str, Any]:
         """Load and shear force [force] at the points of the path."""
         if self.ellipse is not None:
