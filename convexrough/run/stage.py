@@ -101,12 +101,6 @@ def limit(contact: Contact) -> float:
     return checks.friction(contact.scene.friction) * contact.load
 
 
-def heads(columns: str) -> Mapping[str, str]:
-    """Headings of printed columns by key, from a text such as "fraction: Q/(fP), force"."""
-    parts = (column.partition(": ") for column in columns.split(", "))
-    return {name: heading or name for name, _, heading in parts}
-
-
 def number(found: Any, name: str) -> Any:
     """The attribute `name` of `found` or of its certificate; for a status, its count."""
     if name in STATUSES:
@@ -125,12 +119,11 @@ class Result(Record):
     """The result of a stage. Summary, tables and printed lines are derived from its `rows`.
 
     found : objects such as ShearState, one for each row, or one object with arrays along steps
-    printed, title : headings of the printed columns, by key, and of the printed table
-    digits, most   : of printed numbers; largest number of printed rows, which are the last ones
+    printed : names of the printed columns that rows may have; default: all
+    digits, most : of printed numbers; largest number of printed rows, which are the last ones
     """
 
-    printed: ClassVar[Mapping[str, str]] = {}
-    title: ClassVar[str] = ""
+    printed: ClassVar[tuple[str, ...]] = ()
     digits: ClassVar[int] = 7
     most: ClassVar[int | None] = None
 
@@ -213,28 +206,23 @@ class Result(Record):
 
     def lines(self) -> list[str]:
         """The printed lines: a table and, where it matters, what is proved about order."""
-        said = self.printed_table(self.name, self.known, self.headings(), self.title)
+        said = self.printed_table(self.name, self.known, self.printed)
         proved = "".join(self.orders)
         if len(self.orders) > 1:
             proved = ", ".join(f"{each} (rows: {n})" for each, n in sorted(self.orders.items()))
         return [*said, *([f"indentations increase with the load: {proved}"] if proved else [])]
 
-    def printed_table(
-        self, name: str, rows: list[Summary], printed: Mapping[str, str], title: str
-    ) -> list[str]:
-        """The lines of the last rows of a table, with a title and units."""
-        units = (f"{it} {unit}" for key, it in printed.items()
-                 if (unit := unit_of(key, self.contact.scene.units)))  # fmt: skip
-        named, cut = ", ".join(units), rows[-(self.most or len(rows)) :]
-        said = [f"{title or name}  ({named})" if named else title or name]
+    def printed_table(self, name: str, rows: list[Summary], printed: Iterable[str]) -> list[str]:
+        """The lines of the last rows of a table, with its name and units."""
+        keys = [key for key in printed or rows[0] if key in rows[0]]
+        units = [(key, unit_of(key, self.contact.scene.units)) for key in keys]
+        named = ", ".join(f"{key} {unit}" for key, unit in units if unit)
+        cut = rows[-(self.most or len(rows)) :]
+        said = [f"{name}  ({named})" if named else name]
         if len(cut) < len(rows):
             said.append(f"(the last {len(cut)} of {len(rows)} rows; all are in the table {name})")
-        cells = [[row[key] for key in printed] for row in cut]
-        return [*said, *aligned([list(printed.values()), *cells], digits=self.digits)]
-
-    def headings(self) -> Mapping[str, str]:
-        """The headings of the printed columns, by key."""
-        return self.printed
+        cells = [[row[key] for key in keys] for row in cut]
+        return [*said, *aligned([keys, *cells], digits=self.digits)]
 
     def plot(self, axes: Axes | None = None, **options: Any) -> Axes:
         """Draw the main figure of the last object in `found`, and return the axes.

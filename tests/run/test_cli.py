@@ -211,7 +211,7 @@ def test_a_stage_is_computed_written_and_printed(run: Any) -> None:
     ran = run(scene_text(more=MORE))
     assert (ran.status, ran.err) == (0, "")
     said = json.loads(Path("a-results/summary.json").read_text())["onset"]
-    assert re.search(rf"^onset of sliding\nquantile +Q/\(fP\)\n +0 +{said[0]['onset']:.7g}$",
+    assert re.search(rf"^onset\nquantile +onset\n +0 +{said[0]['onset']:.7g}$",
                      ran.out, re.M)  # fmt: skip
     file = cr.read_scene("a.toml")
     contact = file.press()

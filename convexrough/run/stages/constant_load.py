@@ -18,7 +18,7 @@ from convexrough.friction.fretting import Fretting, fretting, fretting_columns
 from convexrough.friction.path import history
 from convexrough.friction.shear import shear
 from convexrough.friction.steady import cycles
-from convexrough.run.stage import Columns, Labels, Result, Stage, Steps, Summary, heads, limit
+from convexrough.run.stage import Columns, Labels, Result, Stage, Steps, Summary, limit
 from convexrough.run.values import ALSO_ONE, Fractions, Mistake, Positive, Shares, Whole, expected
 from convexrough.scene.rings import one_of_each_ring
 
@@ -57,7 +57,7 @@ class ShearStage(Stage):
 
 class ShearResult(Result):
     stage: ShearStage
-    printed = heads("fraction: Q/(fP), force, displacement, sliding, partial, undecided")
+    printed = ("fraction", "force", "displacement", "sliding", "partial", "undecided")
 
     def proved_forces(self) -> Iterator[float]:
         return (abs(state.force) for state in self.found)
@@ -137,13 +137,9 @@ class CycleStage(Stage):
 
 class CycleResult(Result):
     stage: CycleStage
-    title = "steady cycles: amplitudes Qa of the force and Xa of the displacement, energy loss W"
     digits = 6
-    printed = heads(
-        "maximum_fraction: max/(fP), minimum_fraction: min/(fP), force_amplitude: Qa, "
-        "displacement_amplitude: Xa, secant_stiffness: Qa/Xa, loss: W, loss_factor: W/(pi Qa Xa), "
-        "loss_normalised: W/W0, smooth_normalised: smooth W/W0, sliding, undecided"
-    )
+    printed = ("maximum_fraction", "minimum_fraction", "force_amplitude", "displacement_amplitude",
+               "loss", "loss_factor", "loss_over_smooth", "sliding")  # fmt: skip
 
     def rows(self) -> list[Summary]:
         rows = super().rows()
@@ -193,15 +189,6 @@ class CycleResult(Result):
         ])  # fmt: skip
         return {**super().tables(), "loop": curves, "fretting": worn}
 
-    def headings(self) -> Mapping[str, str]:
-        """The headings of columns in the rows."""
-        return {name: head for name, head in self.printed.items() if name in self.known[0]}
-
-    def lines(self) -> list[str]:
-        said = "W0: six times the smooth body's W at the onset of gross sliding"
-        none = math.isnan(self.known[0]["smooth_normalised"])
-        return [*super().lines(), "no W/W0: no smooth reference" if none else said]
-
     def figures(self) -> Mapping[str, Any]:
         widest = max(self.worn, key=lambda each: each.maximum - each.minimum)
         figures = plots.cycle_figures(self.found, loops=self.loops)
@@ -227,4 +214,4 @@ class HistoryStage(Stage):
 
 class HistoryResult(Steps):
     stage: HistoryStage
-    printed = heads("fraction: Q/(fP), displacement, loss")
+    printed = ("fraction", "displacement", "loss")

@@ -18,7 +18,7 @@ from convexrough.friction.steady import steady
 from convexrough.melan.shakedown import Theory, shakedown
 from convexrough.record import rows_of
 from convexrough.run import values
-from convexrough.run.stage import STATUSES, Columns, Result, Stage, Steps, Summary, heads, numbers
+from convexrough.run.stage import STATUSES, Columns, Result, Stage, Steps, Summary, numbers
 from convexrough.run.values import Finite, Mistake, Phase, Positive, expected
 
 COUNTS = tuple(status for status in STATUSES if status != "contact")
@@ -100,8 +100,7 @@ class PathStage(_Points):
 
 class PathResult(Steps):
     stage: PathStage
-    title = "load path"
-    printed = heads("load: P, force: Q, displacement, loss, stuck, partial, sliding")
+    printed = ("load", "force", "displacement", "loss", "stuck", "partial", "sliding")
 
     def lines(self) -> list[str]:
         return [*super().lines(), *self.stage.chords()]
@@ -159,9 +158,7 @@ class SteadyStage(_Points):
 class SteadyResult(Result):
     stage: SteadyStage
     most = Steps.most
-    printed = heads(
-        "level: stuck below load, loss, loss_error: error, partial, sliding, intermittent"
-    )
+    printed = ("level", "loss", "loss_error", "partial", "sliding", "intermittent")
 
     def summary(self) -> Summary:
         said = self.known[0] | numbers(self.found[0], ("order", "presses"))
@@ -184,10 +181,9 @@ class SteadyResult(Result):
 
     def lines(self) -> list[str]:
         said = [*super().lines(), *self.stage.chords()]
-        printed = heads("phase, factor, loss, smooth: smooth sphere")
         for name, columns in self.by_phase.items():
-            table = self.printed_table(name, rows_of(columns), printed, "loss against phase")
-            said += ["", *table]
+            printed = ("phase", "factor", "loss", "smooth")
+            said += ["", *self.printed_table(name, rows_of(columns), printed)]
         return said
 
     def figures(self) -> Mapping[str, Any]:
@@ -246,7 +242,7 @@ class ShakedownStage(Stage):
 class ShakedownResult(Result):
     stage: ShakedownStage
     digits = 12
-    printed = heads("factor, lower: lower bound, upper: upper bound, gross: gross sliding")
+    printed = ("factor", "lower", "upper", "gross")
 
     def summary(self) -> Summary:
         (found,) = self.found
