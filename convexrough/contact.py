@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -150,20 +150,17 @@ class Contact(Cached, Table, Plottable):
         from convexrough.proof import prove, refuse_many
 
         refuse_many(self.scene)
-        given = [*sheared] if isinstance(sheared, Iterable) else [sheared]
-        for k, state in enumerate(given):
-            other = getattr(state, "contact", self) is not self
-            if other or not isinstance(getattr(state, "force", None), int | float):
-                kind = f"a {type(state).__name__}" if hasattr(state, "contact") else repr(state)
-                found = "a state of another contact" if other else kind
-                expected = "a shear state of this contact, a result of `shear`"
-                raise InputError(f"sheared[{k}]", found=found[:60], expected=expected)
+        checks.sequence("sheared", sheared, "a list of shear states of this contact")
         by_load = self.prescribed_load is not None
         levels, states = self.cached(levels_of), []
-        for k, state in enumerate(given):
-            drop = abs(Fraction(state.force)) / Fraction(checks.friction(self.scene.friction))
+        for k, state in enumerate(sheared):
+            force = getattr(state, "force", None)
+            if getattr(state, "contact", self) is not self or not isinstance(force, int | float):
+                expected = "a shear state of this contact, a result of `shear`"
+                raise InputError(f"sheared[{k}]", found=checks.shown(state), expected=expected)
+            drop = abs(Fraction(force)) / Fraction(checks.friction(self.scene.friction))
             if drop == 0 or drop >= (1 - AT_THE_END * Fraction(ROUNDOFF)) * Fraction(self.load):
-                found = f"the shear force {state.force:.17g}"
+                found = f"the shear force {force:.17g}"
                 expected = "one between 0 and f P: there is no proof of rest or gross sliding"
                 raise InputError(f"sheared[{k}]", found=found, expected=expected)
             if getattr(state, "order", "") == "fails":
@@ -171,7 +168,7 @@ class Contact(Cached, Table, Plottable):
             left = levels.top.load - Ball.exact(drop / Fraction(levels.problem.units.force))
             near = levels.at(left).trial
             assert near is not None  # only a level at the load 0 has no trial loads
-            states.append((state.force, near))
+            states.append((force, near))
         assert levels.top.trial is not None
         return prove(
             self.scene,

@@ -35,14 +35,14 @@ STEEP = 0.2  # ratio of radii at which paraboloid and sphere differ by 1 %
 
 def limits_of(contact: Contact) -> dict[str, Any]:
     """The measures of `limits` for a contact."""
-    known = contact.contact_radii, contact.crowding, contact.covered, contact.approach
-    return limits(contact.scene, contact.loads, *known)
+    known = {"crowding": contact.crowding, "covered": contact.covered}
+    return known | limits(contact.scene, contact.loads, contact.approach, contact.contact_radii)
 
 
-def limits(
-    scene: Scene, loads: Array, radii: Array, crowding: float, covered: int, approach: float
-) -> dict[str, Any]:
-    """Measures of the validity of the model, by name, for loads and contact radii (n,)."""
+def limits(scene: Scene, loads: Array, approach: float, radii: Array) -> dict[str, Any]:
+    """Measures of the validity of the model, by name, for loads and contact radii (n,); without
+    `crowding` and `covered`, which `Contact` has.
+    """
     touching, hardness, pressures = loads > 0, scene.material.hardness, mean_pressures(loads, radii)
     reaches = (
         (np.linalg.norm(scene.contact_points[:, axes], axis=1) + radii)[touching] / R
@@ -50,8 +50,6 @@ def limits(
     )
     return {
         "loaded": int(touching.sum()),
-        "crowding": crowding,  # as in `Contact`, also the next
-        "covered": covered,
         # largest distance of a point of contact from the axis, divided by the sphere's radius
         "extent": max((float(reach.max(initial=0.0)) for reach in reaches), default=0.0),
         "array_extent": 0.0 if ends(scene, touching) else array_extent(scene, float(loads.sum())),
@@ -176,8 +174,8 @@ def cautions_about(
     radii = discs_of(scene, loads) if radii is None else radii
     apart = scene.lattice is not None and 2 * radii.max() < 0.99 * scene.lattice.spacing
     near = 0.0 if apart else crowding(scene.contact_points, radii)
-    found = limits(scene, loads, radii, near, covered(scene, radii), approach)
-    return [*cautions(found, scene, approach)]
+    found = {"crowding": near, "covered": covered(scene, radii)}
+    return [*cautions(found | limits(scene, loads, approach, radii), scene, approach)]
 
 
 def is_array(scene: Scene) -> bool:

@@ -27,11 +27,8 @@ def logged(
 ) -> Iterator[None]:
     """Pass every log record of at least the level `least` to `call` while the body runs."""
 
-    class Handler(logging.Handler):
-        def emit(self, record: logging.LogRecord) -> None:
-            call(record)
-
-    handler, level = Handler(least), LOGGER.level
+    handler, level = logging.Handler(least), LOGGER.level
+    handler.emit = call  # type: ignore[method-assign, assignment]
     LOGGER.addHandler(handler)
     LOGGER.setLevel(least)
     try:

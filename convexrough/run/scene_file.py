@@ -8,6 +8,7 @@ import re
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -227,14 +228,12 @@ def tasks_of(
     with blamed_on(path, "material", unless_known=True):
         stuff = study.material.made()
     how: Any = {"friction": study.friction.coefficient if study.friction else None}
-    how |= {"geometry": layout.geometry, "units": units.names}
+    how |= {"geometry": layout.geometry, "units": units.names, "material": stuff}
+    press_on: Callable[[Asperities], Scene] = partial(Scene, checked(study.sphere.radius), **how)
 
     given: Any = {"approach": study.normal.approach, "load": study.normal.load}
     given |= {"stages": study.stages, "solver": named(study.solver.name)}
     given |= {"influence": study.solver.influence}
-
-    def press_on(asperities: Asperities) -> Scene:
-        return Scene(checked(study.sphere.radius), asperities, stuff, **how)
 
     def task(seed: int | None) -> Task:
         highest = None

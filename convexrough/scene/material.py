@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from convexrough import checks
 from convexrough.errors import InputError
 
 
-@dataclass(frozen=True, init=False)
+@dataclass(frozen=True)
 class Material:
     """The elastic constants of both bodies; `pair` combines two different materials.
 
@@ -31,23 +31,17 @@ class Material:
 
     contact_modulus: float
     poisson_ratio: float
-    hardness: float | None
-    mismatch: float
+    hardness: float | None = None
+    mismatch: float = field(default=0.0, kw_only=True)
 
-    def __init__(
-        self,
-        contact_modulus: float | None = None,
-        poisson_ratio: float | None = None,
-        hardness: float | None = None,
-        *,
-        mismatch: float = 0.0,
-    ) -> None:
+    def __post_init__(self) -> None:
         self.__dict__.update(
-            contact_modulus=checks.positive("contact_modulus", contact_modulus),
-            poisson_ratio=checks.between("poisson_ratio", poisson_ratio, 0.0, 0.5),
-            hardness=None if hardness is None else checks.positive("hardness", hardness),
-            mismatch=checks.between("mismatch", mismatch, -0.5, 0.5),
+            contact_modulus=checks.positive("contact_modulus", self.contact_modulus),
+            poisson_ratio=checks.between("poisson_ratio", self.poisson_ratio, 0.0, 0.5),
+            mismatch=checks.between("mismatch", self.mismatch, -0.5, 0.5),
         )
+        if self.hardness is not None:
+            self.__dict__.update(hardness=checks.positive("hardness", self.hardness))
 
     @classmethod
     def from_youngs(
