@@ -10,7 +10,6 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from operator import index
 from typing import Any, ClassVar, cast
 
 import numpy as np
@@ -75,9 +74,7 @@ class Contacts(Table):
 
     def __getitem__(self, k: int) -> Contact:
         """The contact of scene k. Raises IndexError if there is none."""
-        if not -len(self) <= index(k) < len(self):
-            raise IndexError(f"scene {k}: expected an index from 0 to {len(self) - 1:,}")
-        k = index(k) % len(self)
+        k = range(len(self))[k]
         if k not in self._known:
             name, start = "load" if self.by_load else "approach", self.asperity_loads[k]
             self._known[k] = _pressed(self.scenes[k], name, self.controls[k], start)

@@ -93,8 +93,7 @@ def sweep(
     quantiles of the results in the folder DIR; with --out it also writes them, and figures.
 
     Exit status: 0 if all computed scenes are certified; 2 if the input is wrong; 3 if a scene is
-    undecided; 4 if a scene failed, or if the sweep stopped because worker processes died or had
-    other versions of packages than this command; 130 if interrupted. If the command stops early,
+    undecided; 4 if a scene failed or workers died; 130 if interrupted. If the command stops early,
     the rows computed so far are kept, and the same command with --resume computes the rest.
     """
     if (sweep is None) == (summary is None):
@@ -151,8 +150,8 @@ def _say_summary(folder: Path, output: common.Output) -> int:
     if output.out is not None:
         counts = {name: said["sweep"][name] for name in ("scenes", "rows")}
         with common.progress("writing results"), output.folder(output.out, **counts) as new:
-            left_out = report.write_summary(new, table, found)
-        lines += [*common.written(new), *left_out]
+            report.write_summary(new, table, found)
+        lines += common.written(new)
     warnings = [*report.incomplete(said), *report.cautions(table)]
     output.say({**said, "quantiles": rows_of(found)}, lines, warnings)
     return _status(said)
@@ -187,10 +186,9 @@ def new(scene: Path) -> int:
 def check(proof: Path) -> int:
     """Check the claims of a proof file, in exact arithmetic.
 
-    PROOF is a file that `run --proof` or `verify --proof` wrote. It claims bounds on loads and
-    losses, and statuses of asperities. Exit status: 0 if all claims are proved; 1 if a claim is not
-    proved, and the reason is printed; 2 if the file is unreadable. `python checker.py PROOF` does
-    the same; the file checker.py of this package needs only Python.
+    PROOF is a file that `run --proof` or `verify --proof` wrote. Exit status: 0 if all claims are
+    proved; 1 if a claim is not proved, and the reason is printed; 2 if the file is unreadable.
+    `python checker.py PROOF` does the same; this file of the package needs only Python.
     """
     from convexrough import checker
 

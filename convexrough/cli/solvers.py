@@ -27,11 +27,9 @@ def compare(
     All solvers of the package are compared with Newton's method, and so are SCS and QOCO, which
     solve a cone program, if they are installed. With --solver, only the named solvers are compared.
 
-    Exit status, by the first case that applies: 2 if the input is wrong; 3 if a certified result
-    contradicts another result that is proved to be the only solution; 4 if a solver failed; 3 if no
-    result is certified, if a load differs from that of Newton's method by more than --within, or if
-    a solver does not accept the scene; else 0. A contradiction shows a mistake in the mathematics
-    or the code of this package.
+    Exit status: 2 if the input is wrong; 3 if certified results contradict each other, a mistake of
+    this package; else 4 if a solver failed; 3 if no result is certified, if a load differs by more
+    than --within, or if a solver does not accept the scene; else 0.
     """
     from convexrough.comparison import compare as compare_solvers
     from convexrough.comparison import solver_named
@@ -76,13 +74,10 @@ def compare(
 def export(output: common.Output, scene: Path, formats: tuple[str, ...], bristles: int) -> int:
     """Write a scene as cone and quadratic programs for other solvers.
 
-    The cone program, which is equivalent to the contact law, and its dual, which bounds the energy
-    from below, are written as cbf, json (Clarabel) and npz, each in its own files. The quadratic
-    program of bristles (springs that together approximate Hertz's law) is written as mps and npz
-    (qpsolvers). For each program, index.json gives the minimum of the objective, the units of
-    energy and load, and the indices of the asperities.
-
-    Programs go to the folder SCENE-programs unless --out names another.
+    The cone program of the contact law and its dual are written as cbf, json (Clarabel) and npz,
+    the quadratic program of bristles (springs that approximate Hertz's law) as mps and npz
+    (qpsolvers). For each program, index.json gives the minimum of the objective, units and the
+    indices of the asperities. The folder is SCENE-programs unless --out names another.
     """
     from convexrough.programs.program import write_programs
     from convexrough.run.scene_file import read_scene
@@ -127,13 +122,11 @@ def gallery(
 ) -> int:
     """List, export or time hard scenes with 50-digit answers.
 
-    A case is a scene; the cases of a family are hard in the same way. NAMES are names of cases or
-    families; default: all cases. --export writes each case as a quadratic program (.npz for
-    qpsolvers) and as a cone program (JSON for Clarabel, and CBF), with an index; --force replaces
-    an earlier export. --profile prints how many solutions of each solver are right, and its times;
-    --solver limits it to Newton's method and the named solvers. Loads are right if all errors are
-    at most 0.1 % of the largest load. The contact set is right if exactly the asperities that touch
-    have a load. With --solver the exit status is 4 if a solver failed, else 3 if loads are wrong.
+    NAMES are names of cases or of families of cases; default: all. --export writes each case as a
+    quadratic program (.npz for qpsolvers) and as a cone program (JSON for Clarabel, and CBF), with
+    an index. --profile prints how many solutions of each solver are right to 0.1 % of the largest
+    load, and its times; --solver limits it to Newton's method and the named solvers. With --solver
+    the exit status is 4 if a solver failed, else 3 if loads are wrong.
     """
     from convexrough import gallery as wing
     from convexrough.comparison import solver_named
@@ -181,8 +174,7 @@ def bench(output: common.Output, quick: bool, page: Path | None) -> int:
     """Measure time and error of solvers for many scene sizes.
 
     Results go to the folder bench-results unless --out names another. With --page, the command also
-    replaces the text of FILE between the markers "bench: begin" and "bench: end", and the figures
-    of FILE, which are in the folder "figures" next to it.
+    replaces the text of FILE between the markers "bench: begin" and "bench: end", and its figures.
     """
     from convexrough.bench import rows, suite
 

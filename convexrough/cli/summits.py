@@ -115,12 +115,10 @@ def summits(
     SURFACE is a .npy, .npz or .mat file, an instrument's file, or a text or .xlsx file with a
     matrix of heights or with columns x, y and height. The command can also press a sphere on the
     middle of the map: give --scene; or --radius and --approach; or --radius, --load and --modulus.
-    It then reports contacts, certificate, crowding (above 1, contact discs overlap) and model error
-    for several values of --prune, and from which value on the assumptions of the asperity model are
-    met. Stronger pruning lowers the load at a given approach. With --whole it also computes
-    the contact of the whole map at the same approach, with one boundary element per pixel, and
-    compares the two. Summits, a summary and, without --no-figures, figures are written to the
-    folder of --out; by default this is a-summits for a.npz.
+    It then reports contacts, certificate and model error for several values of --prune, and from
+    which value on the assumptions of the asperity model are met. With --whole it compares them with
+    the contact of the whole map at the same approach, with one boundary element per pixel. Results
+    of a.npz go to the folder a-summits unless --out names another.
 
     The exit status is 3 if the contact at the given --prune is not certified.
     """

@@ -100,16 +100,12 @@ def verify(
     Columns x and y, or an index, assign each row to an asperity; without them the rows are in the
     order of the scene. An asperity with a positive load is claimed to touch; an asperity with the
     load 0 is claimed to be open. If there is a column pressure and no column load, rows are nodes
-    or pixels. Pressure times area is added to the load of the asperity with the least r^2 - a^2,
-    where r is its distance and a the contact radius that follows from its sum. The areas are in the
-    column area; if there is no such column, each row is a pixel of a regular grid. With --out the
-    command writes a table, a figure and verdict.json.
+    or pixels of a regular grid, whose pressures times areas (column area) are summed by asperity.
+    With --out the command writes a table, a figure and verdict.json.
 
     Exit status: 0 if it is proved that exactly the claimed asperities touch (with --shear also that
     exactly the claimed ones slide), and that no error exceeds --within; 2 if the input is wrong; 3
-    if a claim is wrong or not proved, if an error may exceed --within, or if --proof finds no
-    proof; 4 if the shear problem could not be solved. With --explain nothing is checked, and the
-    exit status is 0 if the files can be read.
+    if this is not proved, or if --proof finds no proof; 4 if the shear problem could not be solved.
     """
     import numpy as np
 

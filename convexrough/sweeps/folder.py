@@ -3,8 +3,8 @@
 The manifest describes the sweep. A part is a Parquet file of consecutive rows, written once and
 named by its first scene and a hash of its sweep, so that parts of another sweep are never read.
 All parts except the last have the same number of rows, which the manifest states. A complete part
-is never changed; a damaged one is removed and computed again. Another sweep replaces the manifest
-and removes all parts; the earlier sweep, if it still runs, then stops.
+is never changed. Another sweep replaces the manifest and removes all parts; the earlier sweep, if
+it still runs, then stops.
 """
 
 from __future__ import annotations
@@ -85,9 +85,10 @@ class Folder:
             found = parquet.read_table(path, columns=list({"scene", *wanted}), **how)
         except (OSError, pyarrow.ArrowException) as error:
             why = " ".join(str(error).split())
-            raise FileError(f"{path}: damaged ({why}); {RESUME} computes it again") from error
+            advice = f"remove this file; {RESUME} then computes it again"
+            raise FileError(f"{path}: damaged ({why}); {advice}") from error
         if not np.array_equal(found["scene"].to_numpy(), part):
-            raise FileError(f"{path}: has rows of other scenes; {RESUME} computes it again")
+            raise FileError(f"{path}: has rows of other scenes; remove this file")
         arrays = {name: found[name].to_numpy() for name in wanted}
         return {  # pyarrow returns text as objects
             name: values.astype(np.str_) if values.dtype == object else values
@@ -97,31 +98,22 @@ class Folder:
     def missing(self, wanted: list[range], resume: bool) -> tuple[list[range], str]:
         """The parts of `wanted` that are not yet computed, and a message on what was found.
 
-        Damaged parts and unfinished files are removed. Raises FileError if a part must not exist.
+        Their unfinished files are removed. Raises FileError if a part must not exist.
         """
         known = {part.start for part in self.parts()}
-        there = [part for part in wanted if part.start in known]
+        todo = [part for part in wanted if part.start not in known]
         count = sum(map(len, wanted))
-        if there and not resume:
+        found = count - sum(map(len, todo))
+        if found and not resume:
             raise FileError(
-                f"{self.path}: holds {sum(map(len, there)):,} of these {count:,} scenes already; "
-                f"{RESUME} computes the rest, {OVERWRITE} replaces them, {OUT} names another folder"
+                f"{self.path}: holds {found:,} of these {count:,} scenes already; {RESUME} computes"
+                f" the rest, {OVERWRITE} replaces them, {OUT} names another folder"
             )
-        todo, damaged = [part for part in wanted if part.start not in known], 0
-        for part in there:
-            try:
-                self.read(part)
-            except FileError:
-                self.file(part.start).unlink()
-                todo.append(part)
-                damaged += 1
-        todo.sort(key=lambda part: part.start)
         mine = {f".{self.file(part.start).name}" for part in todo}
         for path in (self.path / PARTS).glob(".*.unfinished"):
             if path.name.rsplit(".", 2)[0] in mine:
                 path.unlink(missing_ok=True)
-        said = f"found {count - sum(map(len, todo)):,} scenes of an earlier run"
-        return todo, said + (f", damaged parts removed: {damaged:,}" if damaged else "")
+        return todo, f"found {found:,} scenes of an earlier run"
 
 
 def open_folder(path: Path) -> Folder:

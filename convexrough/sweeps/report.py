@@ -18,8 +18,8 @@ from convexrough.sweeps.plan import Plan
 from convexrough.sweeps.table import SweepTable, open_sweep
 from convexrough.tabular.columns import aligned, labelled
 
-#: The printed quantiles; the largest numbers of printed rows, printed failures and drawn figures.
-AT, MOST_ROWS, MOST_NAMED, MOST_FIGURES = (0.05, 0.5, 0.95), 40, 5, 24
+#: The printed quantiles; the largest numbers of printed rows and of printed failures.
+AT, MOST_ROWS, MOST_NAMED = (0.05, 0.5, 0.95), 40, 5
 
 
 def summarise(table: SweepTable, **did: Any) -> Summary:
@@ -80,16 +80,13 @@ def _messages(table: SweepTable, status: str) -> Iterator[str]:
             yield f"scene {block['scene'][row]}: {block['message'][row]}"
 
 
-def write_summary(new: Writer, table: SweepTable, found: Columns) -> list[str]:
-    """Write quantiles.csv and figures; a line tells how many figures are left out, if any are."""
-    pairs = [(name, key) for key in table.swept for name in table.measured]
+def write_summary(new: Writer, table: SweepTable, found: Columns) -> None:
+    """Write quantiles.csv, and a figure of each measured number against each swept key."""
     new.tables({"quantiles": found})
-    figures: Any = {f"{name}-over-{key}": table.plot(name, key).figure
-                    for name, key in pairs[:MOST_FIGURES]}  # fmt: skip
-    new.figures(figures)
-    more = len(pairs) - MOST_FIGURES
-    advice = "cr.open_sweep(DIR).plot(quantity, key) draws each in Python"
-    return [f"not drawn: {more} more figures; {advice}"] if more > 0 else []
+    for key in table.swept:
+        for name in table.measured:
+            figure: Any = table.plot(name, key).figure
+            new.figures({f"{name}-over-{key}": figure})
 
 
 def progress_kept(folder: Path, plan: Plan) -> str:
