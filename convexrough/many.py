@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks, threads
-from convexrough.arrays import Array, Indices, frozen
+from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact, press
 from convexrough.errors import InputError, SolverError
 from convexrough.friction.cycle import Cycle
@@ -39,7 +39,6 @@ class Contacts(Table):
     load_errors, approach_errors : (m,) bounds on the errors of `loads` and `approaches`
     asperity_loads, asperity_load_errors : (m, n) [force] loads, and bounds on their errors
     status   : (m, n) "contact" or "open" where that is proved, else "undecided"
-    alone    : (j,) indices of the j scenes that were pressed one by one
 
     >>> contacts = cr.press_many([scene, scene], approach=[5e-5, 1e-5])
     >>> contacts.asperity_loads.shape, (contacts.status == "contact").sum(axis=1).tolist()
@@ -63,7 +62,6 @@ class Contacts(Table):
     asperity_loads: Array
     asperity_load_errors: Array
     status: NDArray[np.str_]
-    alone: Indices
 
     def __len__(self) -> int:
         return len(self.scenes)
@@ -216,8 +214,7 @@ def press_many(
         try:
             one = known[k] = _pressed(scenes[k], name, controls[k])
         except SolverError as error:
-            what, solver, advice = f"scenes[{k}]: {error.what}", error.solver, error.advice
-            raise SolverError(what, solver=solver, advice=advice, iterate=error.iterate) from error
+            raise SolverError(f"scenes[{k}]: {error}", iterate=error.iterate) from error
         proof = one.certificate
         errors = proof.load_errors.sum() + n * ROUNDOFF * one.load  # and the rounding of the sum
         own = one.load, errors * (1 + SAFETY), one.approach, proof.approach_error
@@ -228,7 +225,6 @@ def press_many(
         scenes=scenes,
         by_load=by_load,
         controls=controls,
-        alone=frozen(np.flatnonzero(alone)),
         **{each: frozen(values) for each, values in fields.items()},
     )
     contacts.__dict__.update(_together=rows, _known=known)

@@ -106,7 +106,6 @@ def export(output: common.Output, scene: Path, formats: tuple[str, ...], bristle
 
 
 @click.command()
-@common.option("--list", "List the cases (default).", name="show_list")
 @common.option("--export DIR", "Folder for programs and answers.", common.PATH)
 @common.option("--profile", "Time every solver and check its solutions.")
 @common.solver_option
@@ -114,7 +113,6 @@ def export(output: common.Output, scene: Path, formats: tuple[str, ...], bristle
 @common.output_options("force", "as_json")
 def gallery(
     output: common.Output,
-    show_list: bool,
     export: Path | None,
     profile: bool,
     solvers: tuple[str, ...],
@@ -150,18 +148,15 @@ def gallery(
         wrong = solvers and any(row["wrong"] for row in found)
         return common.NOT_CERTIFIED if wrong else common.DONE
     cases = [wing.case(name) for name in wanted]
-    lines = []
-    if show_list or export is None:
-        rows = [[it.name, it.family, it.why, len(it), it.touching.sum()] for it in cases]
-        lines = aligned(
-            [["case", "family", "what is hard", "asperities", "touching"], *rows], left=3
-        )
+    heads = ["case", "family", "what is hard", "asperities", "touching"]
+    rows = [[it.name, it.family, it.why, len(it), it.touching.sum()] for it in cases]
+    lines = aligned([heads, *rows], left=3)
     summary = {case.name: {"family": case.family, "why": case.why} for case in cases}
     if export is not None:
         with output.folder(export) as new, common.progress("writing"):
             for name, text in exported(wanted):
                 new.text(name, text)
-        lines += [f"{len(wanted)} cases, {len(new.files)} files, written to {export}"]
+        lines = [f"{len(wanted)} cases, {len(new.files)} files, written to {export}"]
     output.say({"cases": summary}, lines)
     return common.DONE
 

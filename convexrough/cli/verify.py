@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Sequence
+from contextlib import ExitStack, suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +13,6 @@ import click
 from convexrough.atomic import write_text
 from convexrough.cli import common
 from convexrough.errors import (
-    ConvexroughError,
     FileError,
     InputError,
     ProofError,
@@ -129,8 +128,6 @@ def verify(
         with file_errors(each, "be written"):
             each.unlink(missing_ok=True)  # an earlier proof must not remain if this run fails
     with ExitStack() as stack:
-        names = " ".join(map(str, filter(None, (scene, loads, shear))))
-        stack.enter_context(_reported(junit, names))
         with common.progress(f"reading {scene}"):
             file = read_scene(scene)
         manner = _manner(units=file.scene.units, convert=file.convert, **how)
@@ -165,6 +162,7 @@ def verify(
         prove = partial(_proof, file, claimed, of_loads, scene)
         proof = output.proved(prove, new.path if new else Path())
     if junit is not None:
+        names = " ".join(map(str, filter(None, (scene, loads, shear))))
         write_text(junit, report.junit(claims, names))
     lines = [*(each.note for each in read), *about]
     for claim in claims:
@@ -186,19 +184,6 @@ def verify(
         common.say_aside("warning", f"not certified: {', '.join(reasons)}")
     of_solution = ", a proof about the loads of the solution, not about the given ones"
     return output.say_proof(proof, output.out or Path(), status, of_solution)
-
-
-@contextmanager
-def _reported(path: Path | None, files: str) -> Iterator[None]:
-    """A context manager: write an error of the body as JUnit XML, and raise it again."""
-    from convexrough.verdict.report import junit
-
-    try:
-        yield
-    except ConvexroughError as error:
-        if path is not None:
-            write_text(path, junit(error, files))
-        raise
 
 
 def _proof(file: SceneFile, loads: Array, claim: Claim, scene: Path) -> Proof:

@@ -272,7 +272,7 @@ def test_scenes_together_are_those_alone(name: str, by_load: bool) -> None:
         contacts = cr.press_many(scenes, load=[each.prescribed_load for each in alone])
     else:
         contacts = cr.press_many(scenes, approach=approaches)
-    assert len(contacts.alone) == 0
+    assert sum(len(each.places) for each in contacts._together) == len(scenes)
     limits = np.array([each.scene.friction * each.load for each in alone])
     for share in (1e-3, 0.37, 0.999):
         cycles = contacts.cycles(share * limits, -0.4 * share * limits)
@@ -297,7 +297,7 @@ def test_what_rows_do_not_prove_is_done_one_by_one(monkeypatch: pytest.MonkeyPat
         assert ends.losses[k] == ends[k].loss
         assert_array_equal(ends.status[k], ends[k].status)
     monkeypatch.setattr(rows, "MOST", 60)
-    assert cr.press_many(scenes, approach=5e-5).alone.tolist() == [0, 1, 2]
+    assert cr.press_many(scenes, approach=5e-5)._together == []
 
 
 def test_one_force_at_the_limit_counts_as_the_limit() -> None:

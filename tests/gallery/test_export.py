@@ -125,7 +125,7 @@ def test_cbf(name: str, pack: Path, index: Any) -> None:
 
 
 def test_the_command(command: Any, tmp_path: Path) -> None:
-    output = command("gallery", "--list", "few")
+    output = command("gallery", "few")
     assert output.status == 0
     assert output.out.count("\n") == 4
     assert "two equal contacts" in output.out
