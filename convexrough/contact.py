@@ -97,7 +97,7 @@ class Contact(Cached, Table, Plottable):
     @property
     def area(self) -> float:
         """[length^2] total contact area: the sum of the areas of the contact discs."""
-        return total_area(self.contact_radii)
+        return float(np.pi * (self.contact_radii**2).sum())
 
     @cached_property
     def model_error(self) -> float:
@@ -233,11 +233,6 @@ def discs_of(scene: Scene, loads: Array) -> Array:
     return np.asarray(hertz.contact_radius(loads, modulus, scene.relative_radii))
 
 
-def total_area(radii: Array) -> float:
-    """[length^2] the area of contact discs with these radii (n,)."""
-    return float(np.pi * (radii**2).sum())
-
-
 def mean_pressures(loads: Array, radii: Array) -> Array:
     """(n,) loads divided by contact areas; 0 where the contact radius is 0."""
     areas = np.pi * radii**2
@@ -285,8 +280,7 @@ def solve(
 
 def levels_of(contact: Contact) -> Levels:
     """The normal solutions (levels) of a contact's scene at loads up to that of the contact."""
-    named = {each().name: each for each in solvers.SOLVERS.values()}
-    solver: Solver = vars(contact).get("_by") or named.get(contact.solver, solvers.Newton)()
+    solver: Solver = vars(contact).get("_by") or solvers.Newton()
     top: Level | None = vars(contact).get("_top")
     if top is None:  # prove the loads again
         load = contact.prescribed_load

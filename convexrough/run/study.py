@@ -36,20 +36,6 @@ class SphereTable(FileTable):
     radius: values.Radius
 
 
-class MaterialTable(FileTable):
-    alternatives = ("contact_modulus", "youngs_modulus")
-    contact_modulus: Positive | None = None
-    youngs_modulus: Positive | None = None
-    poisson_ratio: Ratio
-    hardness: Positive | None = None
-
-    def made(self) -> Material:
-        if self.youngs_modulus is not None:
-            return Material.from_youngs(self.youngs_modulus, self.poisson_ratio, self.hardness)
-        assert self.contact_modulus is not None  # one of the two
-        return Material(self.contact_modulus, self.poisson_ratio, self.hardness)
-
-
 class BodyTable(FileTable):
     youngs_modulus: Positive
     poisson_ratio: Ratio
@@ -57,6 +43,17 @@ class BodyTable(FileTable):
 
     def made(self) -> Material:
         return Material.from_youngs(self.youngs_modulus, self.poisson_ratio, self.hardness)
+
+
+class MaterialTable(BodyTable):
+    alternatives = ("contact_modulus", "youngs_modulus")
+    contact_modulus: Positive | None = None
+    youngs_modulus: Positive | None = None  # type: ignore[assignment]
+
+    def made(self) -> Material:
+        if self.contact_modulus is None:
+            return super().made()
+        return Material(self.contact_modulus, self.poisson_ratio, self.hardness)
 
 
 class BodiesTable(FileTable):

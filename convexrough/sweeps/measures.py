@@ -110,15 +110,12 @@ def row_label(ends: Sequence[float]) -> str:
     return "_".join(f"{float(it)!r}" for it in (*(it for it in first if it != -last), last))
 
 
-def chosen(
-    contact: Contact, stages: Stages, measures: Sequence[str], rows: dict[str, list[str]]
-) -> tuple[Column, ...]:
+def chosen(contact: Contact, stages: Stages, measures: Sequence[str]) -> tuple[Column, ...]:
     """The columns for each name in `measures`. A name stands for the first number that has it.
 
     Stages are computed until all names are found. Raises InputError for a name of no number.
-
-    rows : the rows of each number of other scenes; those of this scene are added
     """
+    rows: dict[str, dict[str, None]] = {}  # in order, by the name of the number
 
     def number(name: str) -> str:
         return next((each for each in rows if f".{each}".endswith(f".{name}")), "")
@@ -127,8 +124,7 @@ def chosen(
         if not all(map(number, measures)):
             only = {stage: stages[stage]} if stage in stages else {}
             for each, row in measured(contact, only, {stage}).numbers:
-                if row not in rows.setdefault(each, []):
-                    rows[each].append(row)
+                rows.setdefault(each, {})[row] = None
     columns = []
     for name in measures:
         if not number(name):

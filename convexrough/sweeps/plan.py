@@ -194,14 +194,14 @@ def _planned(
     given : all input on which the measured numbers depend, except `measures` and the version
     """
     tried = sorted({(source.count - 1) * k // (TRIED - 1) for k in range(TRIED)})
-    ask, rows = source.part(tried).opened(), dict[str, list[str]]()
+    ask = source.part(tried).opened()
     wrong: Exception | None = None
     with blamed_on(said["source"], unless_known=True):
         for number in tried:
             try:
                 asked = ask(number)
                 contact = asked.press()
-                columns = chosen(contact, asked.stages, measures, rows)
+                columns = chosen(contact, asked.stages, measures)
                 break
             except FAILURES as error:
                 if wrong is None or getattr(error, "what", "") == MEASURE:

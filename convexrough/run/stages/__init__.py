@@ -11,16 +11,6 @@ from convexrough.run.stages.normal import NormalStage as NormalStage
 from convexrough.run.stages.path import PathStage, ShakedownStage, SteadyStage
 
 #: Stages by the names of their tables in a scene file, in the order of results.
-STAGES: dict[str, type[Stage]] = {
-    each.name: each
-    for each in (
-        NormalStage,
-        ShearStage,
-        CycleStage,
-        HistoryStage,
-        PathStage,
-        SteadyStage,
-        ShakedownStage,
-        GradientStage,
-    )
-}
+STAGES: dict[str, type[Stage]] = {each.name: each for each in (
+    NormalStage, ShearStage, CycleStage, HistoryStage, PathStage, SteadyStage, ShakedownStage,
+    GradientStage)}  # fmt: skip

@@ -12,11 +12,13 @@ import numpy as np
 
 from convexrough import plausibility, plots
 from convexrough.arrays import Array
-from convexrough.contact import Contact, press
+from convexrough.contact import Contact
 from convexrough.errors import InputError, SolverError
 from convexrough.normal.certificate import Certificate
+from convexrough.normal.problem import NormalProblem
 from convexrough.run.stage import Columns, Result, Stage, Summary, numbers, unit_of
 from convexrough.run.values import Finite, Positive
+from convexrough.solvers import Newton
 from convexrough.tabular.columns import bound, labelled
 from convexrough.tabular.units import UnitNames, in_unit
 
@@ -105,7 +107,9 @@ def limits_of(contact: Contact) -> Summary:
         heavy = loads >= HEAVY * loads.max()
         with suppress(InputError, SolverError):
             closest = replace(scene, geometry="closest")
-            other = press(closest, approach=contact.approach, start=loads).loads
+            problem = NormalProblem.assemble(closest, approach=contact.approach)
+            found = Newton().solve(problem, loads[problem.candidates] / problem.units.force)
+            other = problem.to_scene(found.loads * problem.units.force)
             change = float(np.abs(other[heavy] / loads[heavy] - 1.0).max())
     own = {"geometry": scene.geometry, "closest_change": change}
     return plausibility.limits_of(contact) | own
