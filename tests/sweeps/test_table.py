@@ -210,7 +210,7 @@ def test_numbers_that_the_first_scene_lacks() -> None:
         "steady.phase_losses.loss: found row 1, without a column, expected"
     )
     held = sweeping(measure=["by.load", "by.approach"], over=HELD)
-    with pytest.raises(cr.InputError, match="measure: found .by.load., expected a number"):
+    with pytest.raises(cr.InputError, match=r"measure: found .by\.load., expected a number"):
         swept(held | {"gradient": {"of": "loss", "fraction": 0.5}})
 
 
