@@ -8,8 +8,6 @@ for a wrong number of values. No function needs a test framework.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
-from typing import ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,9 +28,6 @@ from convexrough.verdict.report import describe_claim, reason
 
 __tracebackhide__ = True  # pytest shows no frames of this module
 
-P = ParamSpec("P")
-T = TypeVar("T")
-
 
 def assert_certified(
     scene: Scene,
@@ -52,7 +47,7 @@ def assert_certified(
     >>> cr.testing.assert_certified(scene, contact.loads, approach=5e-5, within=1e-9).scope
     'global'
     """
-    verdict = _asked(verify, scene, loads, approach=approach, load=load, within=within, floor=floor)
+    verdict = verify(scene, loads, approach=approach, load=load, within=within, floor=floor)
     if len(verdict.undecided) == len(scene):
         _check_proof(verdict.certificate)
     given, approach = np.where(verdict.claimed, verdict.loads, 0.0), verdict.certificate.approach
@@ -87,7 +82,7 @@ def assert_shear_certified(
     >>> proof.all_proved
     True
     """
-    verdict = _asked(verify_shear, contact, forces, force=force, within=within, sliding=sliding)
+    verdict = verify_shear(contact, forces, force=force, within=within, sliding=sliding)
     _check(verdict)
     return verdict.certificate
 
@@ -116,8 +111,8 @@ def assert_agree(
     >>> cr.testing.assert_agree(contact, other, within=1e-9)
     """
     within = tolerance("within", within)
-    one = _asked(_answer, "first", first, scene, approach, load)
-    other = _asked(_answer, "second", second, scene, approach, load)
+    one = _answer("first", first, scene, approach, load)
+    other = _answer("second", second, scene, approach, load)
     if len(one.loads) != len(other.loads):
         expected = f"as many asperities as in the first, {len(one.loads)}"
         raise InputError("second", found=len(other.loads), expected=expected)
@@ -136,14 +131,6 @@ def assert_agree(
             f"{one.name} and {other.name}: loads differ by {part:.2g} of the largest, expected "
             f"{within:g}: asperities {joined(each)}"
         )
-
-
-def _asked(question: Callable[P, T], *arguments: P.args, **options: P.kwargs) -> T:
-    """question(...); the traceback of an InputError shows no frames of the package."""
-    try:
-        return question(*arguments, **options)
-    except InputError as error:
-        raise error.with_traceback(None) from None
 
 
 def _answer(
