@@ -26,20 +26,11 @@ PAIRS = ((0, 1), (1, 0), (1, 1), (1, -1))
 #: Steps (row, column) from a pixel to the four neighbours with which it shares a side.
 SIDES = ((0, 1), (1, 0), (0, -1), (-1, 0))
 
-#: Standard deviations, estimated from the quartiles, by which a spike differs from the median.
-OUTLYING = 6.0
+#: Difference, over the rms difference of neighbours, by which a spike differs from its neighbours.
+OUTLYING = 5.0
 
-#: Least ratio of the second difference at a spike to those at the other pixels of AROUND. At the
-#: four nearest of them a spike causes a quarter of its own.
-ALONE = 3.0
-AROUND = np.arange(25).reshape(5, 5) != 12
-
-#: A warning is given if at least this fraction of the rows equal the row before. At 1 the map is a
-#: profile.
-MANY_COPIED = 0.25
-
-#: Approximate number of pixels in the sample in which `repeated` counts heights.
-SAMPLE = 2**17
+#: A warning is given if more than this part of the TALLEST maxima have a neighbour of equal height.
+PLATEAUS, TALLEST = 0.67, 100
 
 
 def centres(shape: tuple[int, ...], pixel: tuple[float, float]) -> tuple[Array, Array]:
@@ -129,99 +120,50 @@ def _crossings(
 
 
 def spikes(heights: Array) -> Indices:
-    """(m, 2) row and column of outlying pixels of which at most one neighbour differs from them by
-    less than half of their difference from the median; and of pixels at which the second difference
-    is outlying, and ALONE times as large as at other pixels nearby. Holes (nan) are neither, and
-    single steps of quantised heights are no spikes."""
-    bent = np.abs(ndimage.laplace(heights, mode="mirror"))
-    unknown = np.where(np.isnan(bent), np.inf, bent)
-    others = ndimage.maximum_filter(unknown, footprint=AROUND, mode="constant")
-    least = max(OUTLYING * np.sqrt(np.nanmean(bent**2)), 6.0 * step(heights[~np.isnan(heights)]))
-    alone = (bent > least) & (bent > ALONE * others)
-    low, middle, high = np.nanquantile(heights, (0.25, 0.5, 0.75))
-    away = np.abs(heights - middle)
-    found = np.argwhere(away > OUTLYING * (high - low) / 1.349)
-    padded = np.pad(heights, 1, mode="reflect")
-    alike = np.zeros(len(found), dtype=int)
-    for shift in np.ndindex(3, 3):
-        apart = np.abs(padded[tuple((found + shift).T)] - heights[tuple(found.T)])
-        alike += apart < away[tuple(found.T)] / 2  # this also counts the pixel itself
-    alone[tuple(found[alike <= 2].T)] = True
-    return np.argwhere(alone)
+    """(m, 2) row and column of pixels that differ by more than OUTLYING times the rms difference of
+    unequal neighbours from all of their neighbours, or from all but one. Holes are nan."""
+    rows, columns = heights.shape
+    around = np.pad(heights, 1, mode="reflect")
+    nearest, second = np.full((2, *heights.shape), np.inf)
+    squares = np.zeros(2)  # sum and number of squared differences
+    for down, right in np.ndindex(3, 3):
+        apart = np.abs(around[down : down + rows, right : right + columns] - heights)
+        if (down, right) != (1, 1):
+            squares += np.nansum(apart**2), np.count_nonzero(apart > 0)
+            apart[np.isnan(apart)] = np.inf
+            second = np.minimum(second, np.maximum(nearest, apart))
+            nearest = np.minimum(nearest, apart)
+    least = OUTLYING * np.sqrt(squares[0] / squares[1])
+    return np.argwhere((second > least) & np.isfinite(second))
 
 
 def flaws(heights: Array) -> Iterator[str]:
     """Warnings about heights that look wrong. Holes are nan."""
-    known = heights[~np.isnan(heights)]
-    if many := clipped(known):
-        yield (
-            f"the highest {many:,} pixels have exactly the same height: the map seems to be cut "
-            "off at the top, where asperities touch, and their tip radii are wrong"
-        )
-    if many := repeated(known):
+    _, counts = np.unique(heights[~np.isnan(heights)], return_counts=True)
+    many, others = counts.max(), np.delete(counts, np.argmax(counts)).max(initial=1)
+    if many >= max(10, 5 * others):
         yield (
             f"{many:,} pixels had exactly the same height in the data, many more than have any "
-            "other height: if these are missing values, make them nan"
+            "other height: if these are missing values, make them nan; if they are the highest, "
+            "the map is cut off where asperities touch, and tip radii are wrong"
         )
-    if MANY_COPIED <= (part := copied(heights)) < 1:
+    known = np.where(np.isnan(heights), -np.inf, heights)
+    ring = np.arange(9).reshape(3, 3) != 4
+    around = ndimage.maximum_filter(known, footprint=ring, mode="constant", cval=-np.inf)
+    tops = np.flatnonzero(known >= around)
+    tallest = tops[np.argsort(known.ravel()[tops])[-TALLEST:]]
+    if np.mean(known.ravel()[tallest] == around.ravel()[tallest]) > PLATEAUS:
         yield (
-            f"{part:.0%} of the rows or columns equal the one before: the map seems to be enlarged "
-            "by repeating pixels, and tip radii are wrong; use the map as measured"
+            "most of the highest maxima are plateaus of pixels with equal heights (rounded to "
+            "coarse steps, cut off, or repeated): summits and tip radii are wrong; use heights as "
+            "measured, or try fit=5, or --fit 5"
         )
-
-
-def clipped(heights: Array) -> int:
-    """Number of pixels with the largest height if they are ten, and more than just below; else 0.
-
-    Just below are the pixels within 1 % of the range of heights, or those of the second largest.
-    """
-    top = heights.max()
-    highest = int(np.count_nonzero(heights == top))
-    following = heights.max(where=heights < top, initial=heights.min())
-    near = int(np.count_nonzero(heights >= min(top - 0.01 * np.ptp(heights), following))) - highest
-    return highest if highest >= 10 and highest > near else 0
-
-
-def repeated(heights: Array) -> int:
-    """The number of pixels with the most frequent height, below the largest, or 0 if it is not
-    surprising: in a sample at least 20 times, and 5 times as often as any other height.
-    """
-    sample = heights.ravel()[:: 1 + heights.size // SAMPLE]
-    values, counts = np.unique(sample, return_counts=True)
-    most = int(np.argmax(counts))
-    others = np.delete(counts, most).max(initial=1)
-    if counts[most] < max(20, 5 * others) or values[most] == heights.max():
-        return 0
-    return int(np.count_nonzero(heights == values[most]))
-
-
-def step(heights: Array) -> float:
-    """[length] the distance of the values that heights take, as of grey levels, or 0: in a sample,
-    each value occurs ten times on average, and nine in ten differences are about multiples of it.
-    """
-    sample = heights.ravel()[:: 1 + heights.size // SAMPLE]
-    apart = np.diff(np.unique(sample))
-    if not 0 < 10 * len(apart) < len(sample):
-        return 0.0
-    size = float(np.median(apart))
-    return size if np.mean(np.abs(apart / size - np.rint(apart / size)) <= 0.1) >= 0.9 else 0.0
-
-
-def copied(heights: Array) -> float:
-    """The fraction of rows, not flat, that equal the row before; or that of columns if larger."""
-
-    def part(lines: Array) -> float:
-        equal = (lines[1:] == lines[:-1]).all(axis=1) & (np.ptp(lines[1:], axis=1) > 0)
-        return float(equal.mean()) if len(equal) else 0.0
-
-    return max(part(heights), part(heights.T))
 
 
 def filled(heights: Array) -> Array:
     """The map with filled holes (nan): each is the mean of the pixels that share a side with it.
 
-    So no filled pixel is higher than all pixels around it, except by rounding on a plateau. At
-    least one pixel must have a height.
+    At least one pixel must have a height.
     """
     holes = np.isnan(heights)
     if (count := np.count_nonzero(holes)) == 0:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
-from convexrough.contact import Contact, model_errors
+from convexrough.contact import Contact
 from convexrough.errors import SolverError
 from convexrough.plausibility import FEW
 from convexrough.progress import LOGGER
@@ -17,14 +18,7 @@ from convexrough.record import rows_of
 from convexrough.scene.base import along
 from convexrough.surface.boundary_elements import Whole, press_whole
 from convexrough.surface.detrend import principal
-from convexrough.surface.provability import (
-    LEVELS,
-    TOO_FAR,
-    Press,
-    Provability,
-    crowded,
-    provability,
-)
+from convexrough.surface.provability import LEVELS, Press, Provability, crowded, provability
 from convexrough.surface.summits import Summits
 from convexrough.surface.surface import Surface
 from convexrough.tabular.columns import aligned, labelled
@@ -38,14 +32,13 @@ LENGTHS |= dict.fromkeys(("largest_curvature", "smallest_curvature", "mean_curva
 LENGTHS |= {"density": "1/{}²", "mean_height": "{}", "height_std": "{}"}
 
 #: At most this many crowded pairs of summits, and unused comments, are printed.
-MOST_LISTED, MOST_COMMENTS = 10, 5
+MOST_LISTED = 10
 
 #: A contact farther from the middle than this fraction of the half width causes a warning.
 NEAR_EDGE = 0.9
 
-#: Above this ratio of the twist of a form to the geometric mean of its curvatures along x and y,
-#: these do not describe it.
-TURNED = 0.05
+#: [degrees] Axes of a form that are nearer to x and y than this count as along x and y.
+TURNED = 1.0
 
 #: Largest relative difference without a warning: between a statistic of the summits and its value
 #: for a Gaussian surface, and between the loads of the asperities and of the whole map.
@@ -96,7 +89,7 @@ def surface_summary(scanned: Scanned) -> dict[str, Any]:
             **_named(surface, "source", "comments"),
             **_named(origin, "shape", "pixel", "unit", "level"),
             "removed": [asdict(it) | _named(it, "curvature", "radius") for it in surface.removed],
-            **_named(surface, "filled", "step", "max_height", "rms_height", "rms_slope"),
+            **_named(surface, "filled", "max_height", "rms_height", "rms_slope"),
         },
         "summits": {
             "count": len(summits),
@@ -115,7 +108,6 @@ def surface_summary(scanned: Scanned) -> dict[str, Any]:
     if scanned.contact is not None:
         pairs, values = crowded(scanned.contact)
         summary["crowded"] = rows_of({"summits": pairs, "crowding": values})
-        summary["strained"] = np.flatnonzero(model_errors(scanned.contact) > TOO_FAR).tolist()
     if (form := with_form(scanned)) is not None:
         summary["with_form"] = {"radii": form[0], "angle": form[1]}
     if scanned.whole is not None:
@@ -144,41 +136,41 @@ def describe_surface(scanned: Scanned) -> list[str]:
     """The printed report of `summits`, in aligned lines."""
     surface, summits, origin = scanned.surface, scanned.summits, scanned.summits.origin
     unit = f" {surface.unit}" if surface.unit else ""
-    rows, columns = origin.shape
-    dx, dy = surface.pixel
-    tips = summits.tip_radii
-    left_out = [f"{origin.pruned:,} pruned"]
-    left_out += [f"{origin.at_edge:,} at the edge"] if origin.at_edge else []
-    left_out += [f"{origin.without_top:,} without a fitted maximum"] if origin.without_top else []
-    off = float(np.median(summits.deviations))
-    lines = [
-        ("surface", surface.source),
-        *_not_used(surface.comments),
-        ("pixels", f"{columns:,} by {rows:,}, each {dx:.6g} by {dy:.6g}{unit}"),
-        ("removed", "; ".join(map(str, surface.removed))
-                    or f"nothing; the mean height is {origin.level:.6g}{unit}"),
-        *_pressed_by(scanned),
-        *((("holes filled", f"{surface.filled:,}"),) if surface.filled else ()),
-        ("heights", f"Sz {surface.max_height:.4g}{unit}, Sq {surface.rms_height:.4g}{unit}, "
-                    f"rms slope {surface.rms_slope:.3g}"),
-        ("pruning", f"{100 * origin.prune:.3g} % of Sz, {origin.threshold:.4g}{unit}  (Wolf)"),
-        ("summits", f"{len(summits):,}  (of {origin.maxima:,} maxima: {', '.join(left_out)})"),
-        ("tip radius", f"median {np.median(tips):.4g}{unit}, {tips.min():.4g} to {tips.max():.4g}"
-                       f"  (paraboloids over {origin.fit} by {origin.fit} pixels)"),
-        ("eccentricity", f"median {np.median(summits.eccentricities):.2f}, largest "
-                         f"{summits.eccentricities.max():.2f}  (elliptic tips carry up to "
-                         f"{100 * (summits.elliptic_loads.max() - 1):.2g} % more than spheres)"),
-        ("rms misfit", f"median {off:.2g}{unit}, largest {summits.deviations.max():.2g}"
-                       "  (distance of pixels from the fitted sphere)"),
-        ("bandwidth", f"{surface.moments.bandwidth:.3g}  (m0 {surface.moments.m0:.4g}, "
-                      f"m2 {surface.moments.m2:.4g}, m4 {surface.moments.m4:.4g})"),
-    ]  # fmt: skip
+    (rows, columns), (dx, dy), tips = origin.shape, surface.pixel, summits.tip_radii
+    left_out = {"pruned": origin.pruned, "at the edge": origin.at_edge,
+                "without a fitted maximum": origin.without_top}  # fmt: skip
+    left = ", ".join(f"{count:,} {why}" for why, count in left_out.items())
+    unused = [f'"{shortened(each.strip("#% "))}"' for each in surface.comments]
+    more = f" and {len(unused) - MOST_LISTED:,} more" if len(unused) > MOST_LISTED else ""
+    lines: dict[str, object] = {
+        "surface": surface.source,
+        "comments": unused and f"not used: {', '.join(unused[:MOST_LISTED])}{more}",
+        "pixels": f"{columns:,} by {rows:,}, each {dx:.6g} by {dy:.6g}{unit}",
+        "removed": "; ".join(map(str, surface.removed))
+                   or f"nothing; the mean height is {origin.level:.6g}{unit}",
+        "pressing radius": _pressed_by(scanned),
+        "holes filled": surface.filled and f"{surface.filled:,}",
+        "heights": f"Sz {surface.max_height:.4g}{unit}, Sq {surface.rms_height:.4g}{unit}, "
+                   f"rms slope {surface.rms_slope:.3g}",
+        "pruning": f"{100 * origin.prune:.3g} % of Sz, {origin.threshold:.4g}{unit}  (Wolf)",
+        "summits": f"{len(summits):,}  (of {origin.maxima:,} maxima: {left})",
+        "tip radius": f"median {np.median(tips):.4g}{unit}, {tips.min():.4g} to {tips.max():.4g}"
+                      f"  (paraboloids over {origin.fit} by {origin.fit} pixels)",
+        "eccentricity": f"median {np.median(summits.eccentricities):.2f}, largest "
+                        f"{summits.eccentricities.max():.2f}  (elliptic tips carry up to "
+                        f"{100 * (summits.elliptic_loads.max() - 1):.2g} % more than spheres)",
+        "rms misfit": f"median {np.median(summits.deviations):.2g}{unit}, largest "
+                      f"{summits.deviations.max():.2g}  (distance of pixels from the sphere)",
+        "bandwidth": f"{surface.moments.bandwidth:.3g}  (m0 {surface.moments.m0:.4g}, "
+                     f"m2 {surface.moments.m2:.4g}, m4 {surface.moments.m4:.4g})",
+    }  # fmt: skip
     found = scanned.maxima.statistics, summits.statistics, surface.moments
     table: list[Any] = [["statistics", "all maxima", "after pruning", "from moments"]]
     for name in found[0]._fields:
         named = _in_unit(name, surface.unit).replace("_", " ")
         table.append([named, *(getattr(each, name) for each in found)])
-    described = [*labelled(lines), "", *aligned(table, left=1, digits=4)]
+    described = labelled((name, str(said)) for name, said in lines.items() if said)
+    described += ["", *aligned(table, left=1, digits=4)]
     if scanned.curve is not None:
         force = scanned.contact.scene.units.force if scanned.contact is not None else ""
         described += ["", *_describe_curve(scanned.curve, surface.unit, force)]
@@ -193,44 +185,32 @@ def describe_surface(scanned: Scanned) -> list[str]:
     return described
 
 
-def _not_used(comments: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """The line on comments of the file that were not used, if there are any."""
-    if comments:
-        more = f" and {len(comments) - MOST_COMMENTS:,} more" * (len(comments) > MOST_COMMENTS)
-        shown = ", ".join(f'"{shortened(each.strip("#% "))}"' for each in comments[:MOST_COMMENTS])
-        yield "comments", f"not used: {shown}{more}"
-
-
 def with_form(scanned: Scanned) -> tuple[tuple[float, float], float] | None:
-    """The radii of a body with the shape of the pressing body plus the removed forms, and the angle
-    [degrees] from x to the axis of the first; None if nothing was pressed, or no form is curved."""
+    """The radii of a body with the shape of the pressing body plus the removed forms, that of the
+    axis nearer to x first, and the angle [degrees] from x to this axis; None if nothing was
+    pressed, or no form is curved."""
     forms = [each.tensor for each in scanned.surface.removed if any(each.curvatures)]
     if scanned.contact is None or not forms:
         return None
     both = np.diag(np.divide(1.0, along(scanned.contact.scene.sphere_radius))) + sum(forms)
-    curvatures, angle = both.diagonal().tolist(), 0.0
-    if abs(both[0, 1]) > TURNED * abs(np.prod(curvatures)) ** 0.5:
-        curvatures, angle = principal(both)
-    first, second = (1.0 / each if each else float("inf") for each in curvatures)
+    curvatures, angle = principal(both)
+    if abs(angle) > 45.0:
+        curvatures, angle = curvatures[::-1], angle - math.copysign(90.0, angle)
+    first, second = (1.0 / each if each else math.inf for each in curvatures)
     return (first, second), angle
 
 
-def _pressed_by(scanned: Scanned) -> Iterator[tuple[str, str]]:
-    """The line on the radius of the pressing body, if a curved form was removed from the map."""
+def _pressed_by(scanned: Scanned) -> str:
+    """The radii of the pressing body, if a curved form was removed from the map; else ""."""
     if scanned.contact is None or (found := with_form(scanned)) is None:
-        return
+        return ""
     radii, angle = found
     own = _radii(along(scanned.contact.scene.sphere_radius))
-    both = _radii(radii) if max(radii) > 0 else "no positive radius"
-    said = f"{own}; {both} with the removed form, unless {own} contains it already"
-    if angle and max(radii) > 0:
+    said = f"{own}; {_radii(radii)} with the removed form, unless {own} contains it already"
+    if abs(angle) > TURNED and _radii(radii).startswith("["):
         said += f"; the axis of the first is at {angle:.3g}° from x: "
         said += f"turn x and y of the summits by {-angle:.3g}°"
-    if max(radii) <= 0:
-        said += "; the form is a hollow that is sharper than the body: [sphere] cannot describe it"
-    if min(radii) < 0 < max(radii):
-        said += "; [sphere] accepts no negative radius, but inf for a flat direction"
-    yield "pressing radius", said
+    return said
 
 
 def _radii(radii: tuple[float, float]) -> str:
@@ -246,8 +226,7 @@ def _describe_curve(curve: Provability, unit: str, force: str) -> list[str]:
         table.append([
             f"{100 * row['prune']:.3g} %", f"{row['height']:.4g}", f"{row['summits']:,}",
             f"{row['contacts']:,}", f"{row['undecided']:,}", row["scope"],
-            f"{row['crowding']:.3g}", f"{row['model_error']:.2g}",
-            (row["doubt"] or "met") if row["contacts"] else "-",
+            f"{row['crowding']:.3g}", f"{row['model_error']:.2g}", row["doubt"] or "met",
         ])  # fmt: skip
     first = curve.trusted_from
     met = "met at no pruning" if np.isnan(first) else f"met from a pruning of {100 * first:.3g} %"
@@ -255,14 +234,12 @@ def _describe_curve(curve: Provability, unit: str, force: str) -> list[str]:
         ("assumptions", f"{met}: statuses proved, discs apart, at least {FEW} contacts"),
         ("load", "falls with the pruning at one approach; --whole compares it with the whole map"),
     ]
-    if not curve.contacts.any():
-        said = [("assumptions", "not tested, because nothing touches")]
     least, most = (each.reduce(curve.approaches) for each in (np.fmin, np.fmax))
     lightest, heaviest = (each.reduce(curve.loads) for each in (np.fmin, np.fmax))
     load = f"load {heaviest:.6g} {force}".rstrip() + ", "
-    span = f"{least:.6g}" + (f" to {most:.6g}" if most > least else "")
     at = load if 0 < heaviest <= lightest * (1 + 1e-9) else ""
-    at += f"approach of the pressing body from height 0: {span} {unit}".rstrip()
+    at += "approach of the pressing body from height 0: "
+    at += f"{least:.6g}{f' to {most:.6g}' if most > least else ''} {unit}".rstrip()
     return [*labelled([("pressed at", at)]), *aligned(table), "", *labelled(said)]
 
 
@@ -278,29 +255,6 @@ def _describe_crowded(contact: Contact) -> Iterator[str]:
         yield from (f"    {line}" for line in aligned(table))
         if (more := len(pairs) - MOST_LISTED) > 0:
             yield f"    and {more:,} more; --json prints all"
-    strained = np.flatnonzero(model_errors(contact) > TOO_FAR)
-    if len(strained):
-        said = f"above {TOO_FAR:.0%} at summits {', '.join(map(str, strained[:MOST_LISTED]))}"
-        said += f" and {others:,} more" if (others := len(strained) - MOST_LISTED) > 0 else ""
-        yield from labelled([("model error", said)])
-
-
-def _near_holes(scanned: Scanned) -> Iterator[str]:
-    """A warning about summits whose paraboloids are fitted to pixels that were holes."""
-    if scanned.surface.filled_pixels is None:
-        return
-    from scipy.ndimage import maximum_filter  # slow to import
-
-    near = maximum_filter(scanned.surface.filled_pixels, scanned.summits.origin.fit)
-    invented, contact = near[tuple(scanned.summits.pixels.T)], scanned.contact
-    if not (count := np.count_nonzero(invented)):
-        return
-    said = f"summits fitted to filled pixels, whose heights are not measured: {count:,}"
-    if contact is not None and contact.loads.any():
-        loads = contact.loads[invented]
-        part = loads.sum() / contact.loads.sum()
-        said += f"; touching: {np.count_nonzero(loads):,}, with {part:.1%} of the load"
-    yield said
 
 
 def warnings_about(scanned: Scanned) -> Iterator[str]:
@@ -323,25 +277,22 @@ def warnings_about(scanned: Scanned) -> Iterator[str]:
     if abs(level := summits.origin.level) > surface.max_height:
         mean = f"the mean height is {level:.6g} {surface.unit}".rstrip()
         yield f"{mean}: approaches are measured from height 0; --detrend plane subtracts the mean"
-    yield from _near_holes(scanned)
+    if surface.filled_pixels is not None:
+        from scipy.ndimage import maximum_filter  # slow to import
+
+        near = maximum_filter(surface.filled_pixels, summits.origin.fit)[tuple(summits.pixels.T)]
+        if count := np.count_nonzero(near):
+            yield f"summits fitted to filled pixels, whose heights are not measured: {count:,}"
     if scanned.curve is None:
         return
-    chosen = summits.origin.prune
-    first = scanned.curve.trusted_from
+    first, chosen = scanned.curve.trusted_from, summits.origin.prune
     (doubt,) = scanned.curve.doubts[scanned.curve.prune == chosen]
     if doubt:
         more = f"--prune {first:g} meets all, but pruning lowers the load"
         more = "no pruning meets all" if np.isnan(first) else more
         yield f"assumptions of the model not met at a pruning of {chosen:g}: {doubt}; {more}"
     if contact is None:
-        yield f"at a pruning of {chosen:g} no solution was found"
         return
-    touching = contact.loads > 0
-    if not touching.any():
-        yield (
-            f"at a pruning of {chosen:g} nothing touches, so the model is not assessed: use a "
-            "larger approach, or a load"
-        )
     yield from contact.warnings
     width, diameter = max(surface.size), 2 * min(along(contact.scene.sphere_radius))
     if width > diameter:
@@ -356,7 +307,8 @@ def warnings_about(scanned: Scanned) -> Iterator[str]:
                 f"the asperities carry {abs(less):.0%} {'less' if less > 0 else 'more'} than the "
                 "whole map at the same approach: the asperity model does not represent this map"
             )
-    reach = np.abs(contact.scene.contact_points[touching]).max(axis=0, initial=0.0)
+    touching = contact.scene.contact_points[contact.loads > 0]
+    reach = np.abs(touching).max(axis=0, initial=0.0)
     if (part := float((reach / np.array(surface.size) * 2).max())) > NEAR_EDGE:
         yield (
             f"contact reaches {part:.0%} of the way to the edge of the map: there may be more "

@@ -25,17 +25,12 @@ from convexrough.tabular.units import known_unit
 MOST_ASPECT = 10.0
 
 #: A form, fitted to at most FITTED pixels along a side, causes a warning if it explains more than
-#: the fraction MOST of the variance of heights. A paraboloid whose curvatures differ by less than
-#: ROUND times their mean counts as a sphere.
-MOST, FITTED, ROUND = 0.5, 256, 0.1
+#: the fraction MOST of the variance of heights.
+MOST, FITTED = 0.5, 256
 
 #: Smallest and largest rms slopes without a warning. Lapped steel has about 1e-2, polished wafers
 #: have 1e-3 to 1e-4.
 FLAT, STEEP = 3e-4, 1.0
-
-#: A warning is given if heights have a step larger than this part of their rms second difference.
-#: At this value a tenth of the maxima of a self-affine surface are lost.
-COARSE = 0.5
 
 #: Differences of heights below this part of the largest height are rounding errors.
 ROUNDING = 64 * np.finfo(float).eps
@@ -50,12 +45,9 @@ class Surface(Record, Plottable):
     unit    : unit of all lengths, "" if unknown
     removed : forms subtracted from the heights, in this order
     filled_pixels : (ny, nx) True for pixels that were holes; None if there were none
-    step    : [length] distance of the values that the heights take, as of grey levels; else 0
-    flaws   : warnings about heights that look wrong
     source  : the file, or a description
     comments : comments of the file that were not used
-
-    By default `step` and `flaws` are determined from `heights`.
+    flaws   : warnings about heights that look wrong; default: those found in `heights`
 
     Raises InputError for maps that are constant or have holes, for pixels with one side more than
     ten times the other, and for a unit that is neither "" nor a unit of length such as "mm" or
@@ -73,7 +65,6 @@ class Surface(Record, Plottable):
     filled_pixels: NDArray[np.bool_] | None
     source: str
     comments: tuple[str, ...]
-    step: float
     flaws: tuple[str, ...] = field(repr=False)  # `warnings` has them, too
 
     def __init__(
@@ -85,7 +76,6 @@ class Surface(Record, Plottable):
         filled_pixels: NDArray[np.bool_] | None = None,
         source: str = "",
         comments: tuple[str, ...] = (),
-        step: float | None = None,
         flaws: tuple[str, ...] | None = None,
     ) -> None:
         grid, size = _checked(heights), checked_pixel(pixel)
@@ -98,17 +88,16 @@ class Surface(Record, Plottable):
                 found = f"an array of {filled_pixels.dtype}, of shape {filled_pixels.shape}"
                 expected = f"True or False for each height, of shape {grid.shape}"
                 raise InputError("filled_pixels", found=found, expected=expected)
-        self.__dict__.update(heights=grid, filled_pixels=filled_pixels)
-        known = grid if filled_pixels is None else grid[~filled_pixels]
         self.__dict__.update(
+            heights=grid,
             pixel=size,
             unit=named.name if named else "",
             removed=removed,
+            filled_pixels=filled_pixels,
             source=source,
             comments=comments,
-            step=pixels.step(known) if step is None else step,
-            flaws=tuple(pixels.flaws(self._measured)) if flaws is None else flaws,
         )
+        self.__dict__["flaws"] = tuple(pixels.flaws(self._measured)) if flaws is None else flaws
 
     @property
     def filled(self) -> int:
@@ -157,8 +146,7 @@ class Surface(Record, Plottable):
     def warnings(self) -> tuple[str, ...]:
         """Warnings: of a form that explains most of the variance, and of pixels that look wrong.
 
-        Forms are fitted to at most 256 by 256 of the pixels. One warning counts spikes: single
-        pixels or pairs of neighbours whose heights differ much from the heights around them.
+        Forms are fitted to at most 256 by 256 of the pixels.
 
         >>> ball = np.sqrt(50.0**2 - np.square(np.mgrid[-8:9, -8:9]).sum(axis=0))
         >>> rough = ball + np.random.default_rng(1).normal(size=(17, 17)) * 1e-3
@@ -175,8 +163,6 @@ class Surface(Record, Plottable):
                 trend, there = fitted(few, pixel, kind)
             except InputError:  # no sphere covers the map, or too few pixels are measured
                 continue
-            if kind == "paraboloid" and np.ptp(trend.curvatures) < ROUND * abs(trend.curvature):
-                continue  # a sphere, which is simpler, was tried already
             if (least := float(np.nanvar(few - there))) < (1.0 - MOST) * left:
                 name = f"a {trend!r}".partition(" in the")[0]
                 part = f"{100 * (1.0 - least / np.var(known)):.3g} %"
@@ -189,12 +175,6 @@ class Surface(Record, Plottable):
         if (part := self.filled / self.heights.size) > 0.5:
             yield f"{part:.0%} of the pixels were holes: most of this map is not measured"
         yield from self.flaws
-        if self.step > COARSE * np.sqrt(self.moments.m4) * self.pixel[0] * self.pixel[1]:
-            step = f"{self.step:.4g} {self.unit}".rstrip()
-            yield (
-                f"heights are quantised, in steps of {step}: summits on plateaus and tip radii are "
-                "wrong; use finer heights, or try fit=5, or --fit 5"
-            )
         if not FLAT <= self.rms_slope <= STEEP:
             rare = f"steeper than {STEEP:g}" if self.rms_slope > STEEP else f"flatter than {FLAT:g}"
             yield (
@@ -244,10 +224,8 @@ class Surface(Record, Plottable):
             raise InputError("unit", found=found, expected="units of length")
         scale = own.into(into)
         removed = tuple(each.scaled(scale) for each in self.removed)
-        dx, dy = self.pixel
-        sizes: Any = {"heights": self.heights * scale, "step": self.step * scale}
-        sizes["pixel"] = dx * scale, dy * scale
-        return replace(self, **sizes, unit=into.name, removed=removed)
+        heights, pixel = self.heights * scale, (self.pixel[0] * scale, self.pixel[1] * scale)
+        return replace(self, heights=heights, pixel=pixel, unit=into.name, removed=removed)
 
     @property
     def checksum(self) -> int:

@@ -151,8 +151,7 @@ def test_summits_on_filled_pixels_are_counted(find: Any, surface: cr.surface.Sur
     heights[row + 1 : row + 3, column] = np.nan
     save("holes.npz", heights)
     said = find("holes.npz", *PRESSED, "--fill").err
-    counted = r"summits fitted to filled pixels.*: 1; touching: 1, with \d+\.\d% of"
-    assert re.search(counted, said)
+    assert re.search("summits fitted to filled pixels.*: 1\n", said)
 
 
 @pytest.mark.sample(8)
@@ -221,8 +220,8 @@ def test_where_nothing_touches_nothing_is_to_be_trusted(find: Any) -> None:
     outcome = find("scan.npz", "--radius", "1e4", "--approach", "-100")
     place = "pressed at        approach of the pressing body from height 0: -100 µm\npruning"
     assert place in outcome.out
-    assert "warning: at a pruning of 0.05 nothing touches, so the model is not" in outcome.err
-    assert "assumptions       not tested, because nothing touches" in outcome.out
+    assert "no asperity carries a load: check the sign and unit of the approach" in outcome.err
+    assert "assumptions       met at no pruning" in outcome.out
 
 
 def test_heights_far_from_zero(find: Any, surface: cr.surface.Surface) -> None:
@@ -246,8 +245,9 @@ def test_heights_far_from_zero(find: Any, surface: cr.surface.Surface) -> None:
     [
         ((1 / 3e3, 0.0), 0.0, (2307.7, 1e4), ""),
         ((1 / 3e3, 1 / 6e3), 30.0, (2307.7, 3750.0), "turn x and y of the summits by -[23]"),
-        ((1 / 3e3, -1 / 3e3), 0.0, (2307.7, -4285.7), "accepts no negative radius, but inf for a"),
-        ((-1 / 3e3, -1 / 3e3), 0.0, (-4285.7, -4285.7), "10000; no positive radius with .* hollow"),
+        ((1 / 3e3, 1 / 6e3), 120.0, (3750.0, 2307.7), "turn x and y of the summits by -[23]"),
+        ((1 / 3e3, -1 / 3e3), 0.0, (2307.7, -4285.7), ""),
+        ((-1 / 3e3, -1 / 3e3), 0.0, (-4285.7, -4285.7), ""),
     ],
 )
 def test_the_body_with_a_removed_paraboloid(
@@ -261,9 +261,10 @@ def test_the_body_with_a_removed_paraboloid(
     ran = find("form.npz", *PRESSED, "--detrend", "paraboloid")
     found = json.loads(Path("form-summits/summary.json").read_text())["with_form"]
     assert_allclose(found["radii"], radii, rtol=0.02)
-    assert_allclose(found["angle"], degrees if degrees == 30.0 else 0.0, atol=1)
+    if curvatures[0] != curvatures[1]:
+        assert_allclose(found["angle"], 30.0 if degrees else 0.0, atol=1)
     (line,) = re.findall("pressing radius.*", ran.out)
-    assert re.search(more or r" \[\d+[.\d]*, \d+[.\d]*\] with the removed form", line), line
+    assert re.search(more or r"\] with the removed form", line), line
 
 
 MAP = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1, pixels=384, unit="µm")

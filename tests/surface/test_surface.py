@@ -11,7 +11,7 @@ from scipy.ndimage import gaussian_filter
 
 import convexrough as cr
 from convexrough.sphere import ellipse
-from convexrough.surface.pixels import clipped, filled, hills, repeated, spikes
+from convexrough.surface.pixels import filled, flaws, hills, spikes
 from convexrough.surface.summits import fit_tips
 
 RNG = np.random.default_rng(5)
@@ -164,54 +164,44 @@ def test_spikes_and_drop_outs_are_named() -> None:
     assert steep.startswith("rms slope 4.05: surfaces steeper than 1 are rare")
     (flat,) = cr.surface.Surface(1e-3 * made, 1.0).warnings
     assert flat.startswith("rms slope 9.95e-05: surfaces flatter than 0.0003 are rare")
-    missing = np.where(RNG.random(made.shape) < 0.02, made.min() - 1.0, made)
-    told = cr.surface.Surface(missing, 1.0).detrend("plane").warnings
-    assert f"{(missing == missing.min()).sum():,} pixels had exactly the same height" in told[0]
-    few = np.round(made, 5)
-    few.flat[::500] = 0.0
-    assert repeated(few) == 33
-    assert repeated(np.round(made, 1)) == 0  # few levels, as of images
-    for levels, warned in ((40, True), (100, True), (250, False)):  # as of 8 bits, or fewer
-        step = np.ptp(made) / levels
-        few = np.where(made < np.quantile(made, 0.01), np.nan, np.rint(made / step) * step)
-        holed = cr.surface.Surface(filled(few), 10.0, "µm", filled_pixels=np.isnan(few))
-        assert_allclose(holed.step, step, rtol=1e-9)
-        said = f"heights are quantised, in steps of {1e3 * step:.4g} nm: "
-        assert (said in str(holed.detrend().to_unit("nm").warnings)) == warned
-    y, x = np.mgrid[-40:41, -40:41]
-    smooth = (made, np.tile(made[0], (50, 1)), -0.01 * (x**2 + y**2), np.sqrt(1e4 - x**2 - y**2))
-    assert [cr.surface.Surface(heights, 10.0).step for heights in smooth] == [0, 0, 0, 0]
-    for enlarged in (np.kron(made, np.ones((2, 1))), made[:, np.arange(150) * 2 // 3]):
-        (said,) = cr.surface.Surface(enlarged, 10.0).detrend("plane").warnings
-        assert "of the rows or columns equal the one before: the map seems to be enlarged" in said
-    assert cr.surface.Surface(np.tile(made[0], (50, 1)), 10.0).warnings == ()  # a profile
     grooved[7, 9:11] = 0.0
     grooved[90, 0] = 80.0
     (said,) = cr.surface.Surface(grooved, 10.0).warnings
     assert said.startswith("spikes or drop-outs: 3 pixels far from their neighbours, the first in")
     assert "in row 8, column 10; make them nan and use fill=True, or --fill" in said
-    resolved = gaussian_filter(RNG.normal(size=(100, 100)), 3.0)
-    assert len(spikes(resolved)) == 0
     places = np.array([[3, 0], [20, 30], [50, 50], [70, 10], [99, 99]])
-    resolved[tuple(places.T)] += 3 * resolved.std() * np.array([1, -1, 1, -1, 1])
-    assert (spikes(resolved) == places).all()
     for seed in range(5):
         rng = np.random.default_rng(seed)
-        resolved = gaussian_filter(rng.normal(size=(200, 200)), 3.0)
-        stepped = np.rint(resolved / resolved.std()) * resolved.std()
-        resolved[rng.random(resolved.shape) < 0.1] = np.nan
-        assert len(spikes(resolved)) == len(spikes(stepped)) == 0
+        smooth = gaussian_filter(rng.normal(size=(100, 100)), 3.0)
+        holed = np.where(rng.random(smooth.shape) < 0.1, np.nan, smooth)
+        for steps in (1, 4, 100):
+            assert len(spikes(np.rint(steps * smooth / smooth.std()))) == 0
+        assert len(spikes(smooth)) == len(spikes(holed)) == 0
+        smooth[tuple(places.T)] += 3 * smooth.std() * np.array([1, -1, 1, -1, 1])
+        assert (spikes(smooth) == places).all()
 
 
-def test_a_map_that_is_cut_off_at_the_top_is_named() -> None:
-    """Also after a plane is subtracted from its flat tops."""
-    heights = NOISE + 0.01 * np.arange(NOISE.shape[1])
-    cut = np.minimum(heights, np.quantile(heights, 0.97))
-    for surface in (cr.surface.Surface(cut, 1.0), cr.surface.Surface(cut, 1.0).detrend("plane")):
-        assert any("exactly the same height" in each for each in surface.warnings)
-    levels = np.round(heights * 20)  # as of a byte for each pixel
-    for whole in (heights, levels):
-        assert clipped(whole) == 0
+def test_equal_heights_are_named() -> None:
+    """Missing values, flat tops, coarse steps and repeated pixels; also without a plane."""
+    made = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1, pixels=128).heights + 50.0
+    missing = np.where(RNG.random(made.shape) < 0.02, made.min() - 1.0, made)
+    cut = np.minimum(made, np.quantile(made, 0.999))
+    few = made.copy()
+    few.flat[::500] = 0.0
+    for heights in (missing, cut, few):
+        count = (heights == (heights.max() if heights is cut else heights.min())).sum()
+        for surface in (at := cr.surface.Surface(heights, 10.0), at.detrend("plane")):
+            assert f"{count:,} pixels had exactly the same height" in str(surface.warnings)
+    enlarged = (np.kron(made, np.ones((2, 1))), made[:, np.arange(150) * 2 // 3])
+    steps = [np.rint(made / np.ptp(made) * levels) for levels in (40, 100, 250)]
+    for heights in (*enlarged, *steps[:2]):
+        assert "most of the highest maxima are plateaus" in "".join(flaws(heights))
+    y, x = np.mgrid[-40:41, -40:41]
+    for heights in (made, steps[2], -0.01 * (x**2 + y**2), np.sqrt(1e4 - x**2 - y**2)):
+        assert [*flaws(heights)] == []
+    holed = cr.surface.Surface(filled(np.where(y > x, np.nan, steps[0][:81, :81])), 10.0, "µm",
+                               filled_pixels=y > x)  # fmt: skip
+    assert "plateaus" in str(holed.detrend().to_unit("nm").warnings)
 
 
 def test_a_form_is_fitted_to_measured_pixels() -> None:
