@@ -14,7 +14,7 @@ class Plottable:
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draw the main figure of the result into `axes` (default: new ones); return the axes.
 
-        The docstring of `cr.plots.plot` lists the figures.
+        docs/how-to/results.md, "Plots", lists the figures.
 
         >>> print(contact.plot().get_title(loc="left"))
         touching: 37 of 61
@@ -22,9 +22,3 @@ class Plottable:
         from convexrough.plots import plot  # it imports matplotlib
 
         return plot(self, axes)
-
-    def _picture(self) -> str:
-        """A small map of the result as an HTML image."""
-        from convexrough.plots import thumbnail
-
-        return thumbnail(self)

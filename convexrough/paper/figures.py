@@ -58,7 +58,7 @@ def _rings_figure(found: PaperStates, scale: Scale) -> Figure:
             x, y = scale.length.of(shifted[i] + np.array([contact.contact_radii[i], 0.0]))
             chart.text(x, y, name, va="center", fontsize=7, path_effects=halo, clip_on=True)
     slides = [name for name, ring in named.items() if (found.half.status[ring] == "sliding").any()]
-    style.title(chart, f"slide at $Q/(fP)$ = {SHARE:g}: {', '.join(slides)}")
+    style.title(chart, f"slide at $Q/(fP)$ = {SHARE:g}: {', '.join(slides)}", "center")
 
     rows = np.arange(len(named))
     start = np.array([onsets[ring].min() for ring in named.values()])

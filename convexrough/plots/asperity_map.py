@@ -16,7 +16,6 @@ from matplotlib.patches import Ellipse
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough.arrays import Array, Number
-from convexrough.contact import Contact
 from convexrough.plots import style
 from convexrough.plots.notebook import Figure, panels
 from convexrough.plots.style import COLOURS, DASHED, DOUBLE, FAINT, SINGLE, SMOOTH, Scale, ink
@@ -100,31 +99,24 @@ def draw_map(
     style.label(axes, length.label("x"), length.short("y"))
 
 
-def columns_of(count: int) -> int:
-    """The number of columns of a figure of so many maps."""
-    return count if count <= 4 else 3 if count in (5, 6, 9) else 4
-
-
 def tiles(count: int, lines: int) -> tuple[Figure, list[Axes]]:
     """A new figure of so many maps that share their axes, below titles of so many lines."""
-    columns = columns_of(count)
+    columns = min(count, 4)
     rows, width = -(-count // columns), SINGLE if columns == 1 else DOUBLE
     height = rows * ((width - 0.5) / columns + 0.17 * lines) + (0.95 if columns == 1 else 0.75)
     figure, places = panels(width, height, rows, columns, sharex=True, sharey=True)
     for axes in places[count:]:
         axes.remove()
+    for axes in places[count - columns : count]:
+        axes.tick_params(labelbottom=True)
     return figure, places[:count]
 
 
 def label_tiles(figure: Figure, places: Sequence[Axes], x: str, y: str) -> None:
-    """Label the axes of the maps of `tiles` once, with numbers at the outer ones only."""
-    columns = columns_of(len(places))
+    """Label the axes of the maps of `tiles` once."""
     for axes in places:
         axes.set(xlabel="", ylabel="")
-        if columns == 4:
-            axes.xaxis.set_major_locator(style.round_ticks(4))
-    for axes in places[-columns:]:
-        axes.tick_params(labelbottom=True)
+        axes.xaxis.set_major_locator(style.round_ticks(4))
     figure.supxlabel(x, fontsize=style.LABEL)
     figure.supylabel(y, fontsize=style.LABEL)
 
@@ -145,7 +137,7 @@ def draw_values(
         largest first;  most : the end of the colour scale; default: the largest absolute value
     signed : the colours run from dark for negative values to light for positive ones
 
-    Discs without a finite value are grey; if all are, a text replaces the colour bar.
+    Discs without a finite value are grey, as a legend says; if all are, a text replaces the bar.
     """
     values = np.where(np.isfinite(values), values, np.nan)  # an infinite one would take a colour
     most = float(np.nanmax(np.abs(values), initial=0.0)) or 1.0 if most is None else most
@@ -159,24 +151,14 @@ def draw_values(
         for k, (radius, each) in enumerate(zip(sizes, np.atleast_2d(values), strict=True))
     ]
     draw_map(axes, scale.points, scale.length, layers, outline=scale.axes)
-    if (drawn := sizes > 0).any() and not (np.isfinite(values) & drawn).any():
-        style.write_inside(axes, "not known")
-    else:
-        style.bar(axes, colours, name, above=not signed)
+    drawn, known = sizes > 0, np.isfinite(values)
+    if drawn.any() and not (known & drawn).any():
+        style.say_nothing(axes, "not known")
+        return colours
+    style.bar(axes, colours, name, above=not signed)
+    if (drawn & ~known).any():
+        style.legend(axes, "corner", handles=[style.disc_handle(UNKNOWN, "not known")])
     return colours
-
-
-def unknown_handles(radii: Array, *values: Array) -> list[Line2D]:
-    """A legend entry for discs without a finite value, if there are any."""
-    unknown = any((~np.isfinite(each) & (radii > 0)).any() for each in values)
-    return [style.disc_handle(UNKNOWN, "not known")] if unknown else []
-
-
-def draw_statuses(axes: Axes, contact: Contact, status: NDArray[np.str_]) -> None:
-    """Draw the map of statuses with a legend."""
-    scale, layers = Scale(contact), status_layers(status, contact.contact_radii)
-    draw_map(axes, scale.points, scale.length, layers, outline=scale.axes)
-    style.legend(axes, "below", handles=status_handles(status))
 
 
 def draw_discs(axes: Axes, points: Array, layer: Layer) -> None:
@@ -208,9 +190,9 @@ def draw_outline(
 ) -> None:
     """Draw an ellipse about the origin; nothing without semi-axes."""
     if semi_axes:
-        width, height = (2.0 * axis for axis in semi_axes)
-        edge = colour or ink()
-        axes.add_patch(Ellipse((0, 0), width, height, fill=False, ls=dashes, lw=0.9, ec=edge))
+        sides = [2.0 * axis for axis in semi_axes]
+        look: Any = {"fill": False, "ls": dashes, "lw": 0.9, "ec": colour or ink()}
+        axes.add_patch(Ellipse((0, 0), *sides, **look))
 
 
 def status_layers(

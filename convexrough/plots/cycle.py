@@ -8,7 +8,6 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
 
 from convexrough import checks
 from convexrough.arrays import Array
@@ -17,7 +16,7 @@ from convexrough.friction.cycle import Cycle, Loop
 from convexrough.friction.cycle import loops as steady_loops
 from convexrough.friction.fretting import Fretting
 from convexrough.plots import style
-from convexrough.plots.asperity_map import draw_values, unknown_handles
+from convexrough.plots.asperity_map import draw_values
 from convexrough.plots.notebook import Figure, Figures, no_contact, one_contact, panels
 from convexrough.plots.steady import draw_closed
 from convexrough.plots.style import DASHED, DOUBLE, FAINT, ROUGH, TICK, Scale, ink
@@ -36,10 +35,9 @@ def cycle_figures(cycles: Sequence[Cycle], *, loops: Sequence[Loop] | None = Non
 
     loops : the loop of each cycle; None to compute them
 
-    "hysteresis" : loops of the cycles and of the smooth sphere. If there are more than 4 cycles,
-        only those whose ranges are nearest to 1, 3/4, 1/2 and 1/4 of the widest are drawn. Also
-        loops, in the cycle of the widest range, of one asperity at each of at most 6 distances from
-        the centre
+    "hysteresis" : loops of the cycles and of the smooth sphere; of more than 4 cycles, of those
+        whose ranges are nearest to 1, 3/4, 1/2 and 1/4 of the widest. Also loops, in the cycle of
+        the widest range, of one asperity at each of at most 6 distances from the centre
     "loss" : energy against amplitude, for cycles of several ranges
 
     Raises InputError for cycles of several contacts, or loops that are not those of the cycles.
@@ -49,48 +47,35 @@ def cycle_figures(cycles: Sequence[Cycle], *, loops: Sequence[Loop] | None = Non
     hysteresis loss
     """
     checks.sequence("cycles", cycles, "a list of cycles")
-    cycles = list(cycles)
-    if not cycles:
+    if not (cycles := list(cycles)):
         return Figures()
-    contact = one_contact("cycles", cycles, Cycle)
-    if loops is not None:
-        _check_loops(cycles, loops)
-    several = len(np.unique([each.maximum - each.minimum for each in cycles])) > 1
+    contact, ranges = one_contact("cycles", cycles, Cycle), [it.force_amplitude for it in cycles]
+    several = len(set(ranges)) > 1
     if not contact.loads.any():
         return no_contact("hysteresis", *(["loss"] if several else []))
-    scale = Scale(contact)
-    order = sorted(range(len(cycles)), key=lambda i: cycles[i].force_amplitude)
-    shown = order
-    if len(order) > MOST_LOOPS:  # the nearest to 1/4, 1/2, 3/4, 1 of the widest range
-        amplitudes = np.array([cycles[i].force_amplitude for i in order])
-        parts = amplitudes[-1] * np.arange(1, MOST_LOOPS + 1) / MOST_LOOPS
-        nearest = np.argmin(np.abs(amplitudes[:, None] - parts), axis=0)
-        shown = [order[i] for i in np.unique(nearest)]
-    r = scale.distances
-    known = np.arange(len(r)) if loops is None else loops[order[0]].asperities
-    rings = one_of_each_ring(r[known], contact.loads[known], MOST_ASPERITIES)
-    asperities = known[rings].tolist()
-    named = [(f"{scale.length.of(r[i]):.3g}", i) for i in asperities]
-    some = [cycles[i] for i in shown]
-    theirs = steady_loops(some, POINTS, asperities) if loops is None else [loops[i] for i in shown]
-    figure = loops_figure(some, theirs, named, scale.length.short("r"), scale, len(cycles))
-    figures = Figures({"hysteresis": figure})
+    if loops is not None:
+        ends, right = [max(it.forces) for it in loops], [it.maximum for it in cycles]
+        if len(ends) != len(right) or not np.allclose(ends, right, atol=1e-9 * max(ranges)):
+            raise InputError("loops", found="others", expected="the loop of each cycle, in order")
+    order = np.argsort(ranges, kind="stable").tolist()
+    shown, sizes = order, np.sort(ranges)
+    if len(order) > MOST_LOOPS:  # those nearest to 1/4, 1/2, 3/4 and 1 of the widest range
+        wanted = sizes[-1] * np.arange(1, MOST_LOOPS + 1) / MOST_LOOPS
+        shown = [order[i] for i in np.unique(abs(sizes[:, None] - wanted).argmin(axis=0))]
+    scale, some = Scale(contact), [cycles[i] for i in shown]
+    r, most = scale.distances, MOST_ASPERITIES
+    if loops is None:
+        chosen = steady_loops(some, POINTS, one_of_each_ring(r, contact.loads, most))
+    else:
+        chosen = [loops[i] for i in shown]
+    known = chosen[-1].asperities
+    rings = known[one_of_each_ring(r[known], contact.loads[known], most)].tolist()
+    named = [(f"{scale.length.of(r[i]):.3g}", i) for i in rings]
+    meaning = scale.length.short("r")
+    figures = Figures(hysteresis=loops_figure(some, chosen, named, meaning, scale, len(cycles)))
     if several:
         figures["loss"] = _loss_figure([cycles[i] for i in order], scale)
     return figures
-
-
-def _check_loops(cycles: Sequence[Cycle], loops: Sequence[Loop]) -> None:
-    checks.sequence("loops", loops, "a list of loops")
-    if len(loops) != len(cycles):
-        raise InputError("loops", found=len(loops), expected=f"{len(cycles)}, one per cycle")
-    for k, (cycle, loop) in enumerate(zip(cycles, loops, strict=True)):
-        checks.instance(f"loops[{k}]", loop, Loop)
-        ends, room = (loop.forces.max(), loop.forces.min()), 1e-9 * cycle.force_amplitude
-        other = not np.array_equal(loop.asperities, loops[0].asperities)
-        if other or not np.allclose(ends, (cycle.maximum, cycle.minimum), rtol=1e-9, atol=room):
-            expected = f"that of cycles[{k}], with the asperities of loops[0]"
-            raise InputError(f"loops[{k}]", found="another loop", expected=expected)
 
 
 def loops_figure(
@@ -108,17 +93,16 @@ def loops_figure(
     """
     figure, (whole, upright, single) = panels(DOUBLE, 3.0, 1, 3, width_ratios=[1, 1, 1.1])
     x, q = scale.displacement, scale.force
+    slope = 2.0 / 3.0 * scale.travel / scale.limit
     for cycle, loop in zip(cycles, loops, strict=True):
-        for axes, slope in ((whole, 0.0), (upright, 2.0 / 3.0 * scale.travel / scale.limit)):
-            draw_loop(axes, scale, loop, slope)
-        end = loop.displacements[0] - slope * loop.forces[0]
-        place = (x.of(end), q.of(loop.forces[0]))
+        draw_loop(whole, scale, loop)
+        draw_loop(upright, scale, loop, slope)
+        place = x.of(loop.displacements[0] - slope * loop.forces[0]), q.of(loop.forces[0])
         look = {"fontsize": 7, "va": "center", "path_effects": style.halo()}
         style.note(upright, _range(cycle, scale), place, (4, 2), **look)
-    in_units = x.said and not x.symbol
     less = f"$X\\,/\\,{x.symbol} - \\frac{{2}}{{3}}\\,Q\\,/\\,(fP)$"
     style.label(whole, x.short("X"), q.short("Q"))
-    style.label(upright, x.short("X - Q/k") if in_units else less, "")
+    style.label(upright, less if x.symbol else x.short("X - Q/k"), "")
     upright.sharey(whole)
     upright.tick_params(labelleft=False)
     upright.set_xlim(right=upright.get_xlim()[1] + 0.22 * np.ptp(upright.get_xlim()))
@@ -132,9 +116,9 @@ def loops_figure(
                   borderpad=0.2)  # fmt: skip
     for axes in (whole, upright, single):
         axes.xaxis.set_major_locator(style.round_ticks(4))
-    handles = list({line.get_label(): line for line in reversed(whole.lines)}.values())[::-1]
+    handles = whole.lines[: 1 + (scale.sphere is not None)]
     style.legend(figure, "outside", handles=handles, loc="outside upper left", ncols=2)
-    elastic = ",   $k = 3fP/(2X_0)$" if in_units else ""
+    elastic = "" if x.symbol else ",   $k = 3fP/(2X_0)$"
     figure.supxlabel(f"{scale.footnote()},   $s_i$: gross slip{elastic}", fontsize=TICK)
     return figure
 
@@ -220,12 +204,8 @@ def _loss_figure(cycles: Sequence[Cycle], scale: Scale) -> Figure:
         loss.plot(ends * t, whole, ls=DASHED, lw=1.1, color=ink(), label=scale.name)
     loss.plot(q.of(amplitude), w.of(rough), label="asperities", **marks)
     loss.set(xscale="log", yscale="log", xlim=(ends * t[0], ends))
-    for axis in (loss.xaxis, loss.yaxis):  # at most 6 powers of ten; on a short axis also 2, 5
-        low, high = axis.get_view_interval()
-        short = high / low < 50
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if short else (1.0,), numticks=6))
-        axis.set_major_formatter("{x:g}" if short else LogFormatterSciNotation())
-        axis.set_minor_formatter(NullFormatter())
+    style.log_ticks(loss.xaxis)
+    style.log_ticks(loss.yaxis)
     style.label(loss, "amplitude of " + q.label("Q"), w.label("W"))
     style.legend(loss, "inside")
     style.title(loss, "energy lost per cycle")
@@ -258,11 +238,9 @@ def fretting_figures(worn: Fretting) -> Figures:
     figure, maps = panels(DOUBLE, 6.2, 2, 2, sharex=True, sharey=True)
     pressure, f = scale.units.name("pressure"), scale.limit / worn.contact.load
     most = _largest(worn.largest_tractions) if pressure else f * scale.peak
-    traction = style.measure(most, pressure, f"(f{scale.pressure.symbol})")
+    traction = style.measure(most, pressure, "(fp_0)" if scale.sphere else "")
     energy = style.measure(_largest(worn.losses), scale.units.name("work"), "W_m")
-    draw_slip(maps[0], worn, scale)
-    radii = worn.contact.contact_radii
-    unknown = unknown_handles(radii, worn.slip_amplitudes, worn.losses, worn.largest_tractions)
+    draw_slip(maps[0], worn)
     for axes, values, unit, name, symbol in (
         (maps[1], worn.losses, energy, "energy lost per cycle", "W_i"),
         (maps[2], worn.mean_tractions, traction, "mean traction", "\\bar q_i"),
@@ -272,23 +250,17 @@ def fretting_figures(worn: Fretting) -> Figures:
         style.title(axes, name)
     for axes in maps:
         axes.label_outer()
-    if unknown:
-        style.legend(figure, "outside", handles=unknown, loc="outside lower center")
     low, high = worn.minimum / scale.limit, worn.maximum / scale.limit
     between = f"cycle of $Q/(fP)$ from {low:.4g} to {high:.4g}".replace("-", "\u2212")
     figure.suptitle(between, fontsize=TICK)
     return Figures({"fretting": figure})
 
 
-def draw_slip(axes: Axes, worn: Fretting, scale: Scale | None = None) -> None:
+def draw_slip(axes: Axes, worn: Fretting) -> None:
     """Draw the map of slip amplitudes."""
-    alone = scale is None
-    scale, unit = scale or Scale(worn.contact), worn.contact.scene.units.length
+    scale, unit = Scale(worn.contact), worn.contact.scene.units.length
     slip = style.measure(_largest(worn.slip_amplitudes) if unit else scale.travel, unit, "X_0")
     draw_values(axes, scale, slip.of(worn.slip_amplitudes), slip.short("s_i"))
-    unknown = unknown_handles(worn.contact.contact_radii, worn.slip_amplitudes)
-    if alone and unknown:
-        style.legend(axes, "below", handles=unknown)
     style.title(axes, "slip amplitude at the rim")
 
 

@@ -1,4 +1,4 @@
-"""Figures and axes that notebooks display; `plot`, `thumbnail` and `save`."""
+"""Figures and axes that notebooks display; `plot` and `save`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backend_bases import get_registered_canvas_class
@@ -19,8 +18,6 @@ from matplotlib.figure import Figure as MatplotlibFigure
 from convexrough import checks
 from convexrough.contact import Contact
 from convexrough.errors import InputError
-from convexrough.friction.cycle import Cycle
-from convexrough.friction.path import LoadPath
 from convexrough.plots.style import SINGLE, say_nothing
 
 #: The module and the function that draw a result into axes, by the name of the result's class. A
@@ -65,14 +62,6 @@ class Figure(MatplotlibFigure):
         return as_png(self)
 
 
-def panels(
-    width: float, height: float, rows: int = 1, columns: int = 1, **how: Any
-) -> tuple[Figure, list[Axes]]:
-    """A new figure of this size [inches], and its axes, row by row."""
-    figure = Figure(figsize=(width, height), layout="constrained")
-    return figure, figure.subplots(rows, columns, squeeze=False, **how).ravel().tolist()
-
-
 class ShownAxes(Axes):
     """Axes whose figure notebooks display, without pyplot."""
 
@@ -82,19 +71,30 @@ class ShownAxes(Axes):
         return as_png(figure)
 
 
+class Figures(dict[str, MatplotlibFigure]):
+    """Figures by stems of file names; notebooks display all of them."""
+
+    def _repr_html_(self) -> str:
+        pictures = {stem: b64encode(as_png(figure)).decode() for stem, figure in self.items()}
+        tags = (f'<img alt="{stem}" src="data:image/png;base64,{it}">'
+                for stem, it in pictures.items())  # fmt: skip
+        return "<br>".join(tags)
+
+
+def panels(
+    width: float, height: float, rows: int = 1, columns: int = 1, **how: Any
+) -> tuple[Figure, list[Axes]]:
+    """A new figure of this size [inches], and its axes, row by row."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    return figure, figure.subplots(rows, columns, squeeze=False, **how).ravel().tolist()
+
+
 def new_axes(size: tuple[float, float]) -> Axes:
     """The axes of a new figure of this size [inches]; `pyplot.show` shows it if pyplot is used."""
     if pyplot := sys.modules.get("matplotlib.pyplot"):
         axes: Axes = pyplot.figure(figsize=size, layout="constrained").subplots()
         return axes
     return Figure(figsize=size, layout="constrained").add_subplot(axes_class=ShownAxes)
-
-
-class Figures(dict[str, MatplotlibFigure]):
-    """Figures by stems of file names; notebooks display all of them."""
-
-    def _repr_html_(self) -> str:
-        return "<br>".join(image_tag(stem, figure) for stem, figure in self.items())
 
 
 def no_contact(*stems: str) -> Figures:
@@ -112,46 +112,22 @@ def one_contact(what: str, results: Sequence[Any], *kinds: Any) -> Contact:
         if not isinstance(each, kinds):
             expected = " or ".join(f"a {kind.__name__}" for kind in kinds)
             raise InputError(f"{what}[{k}]", found=f"type {type(each).__name__}", expected=expected)
-        if not _same(each.contact, results[0].contact):
-            expected = f"one of the contact of {what}[0]"
+        if each.contact is not results[0].contact:
+            expected = f"one of the same contact as {what}[0]"
             raise InputError(f"{what}[{k}]", found="a result of another contact", expected=expected)
     contact: Contact = results[0].contact
     return contact
 
 
-def _same(a: Contact, b: Contact) -> bool:
-    """True if two contacts are one, or have equal scenes and loads."""
-    if a is b:
-        return True
-    arrays = [
-        (it.loads, it.scene.contact_points, it.scene.relative_radii, it.scene.offsets)
-        for it in (a, b)
-    ]
-    known = [(it.scene.material, it.scene.friction, it.scene.units) for it in (a, b)]
-    return known[0] == known[1] and all(map(np.array_equal, *arrays))
-
-
-def as_png(figure: MatplotlibFigure, dpi: int = 100) -> bytes:
-    figure.savefig(file := BytesIO(), format="png", dpi=dpi)
+def as_png(figure: MatplotlibFigure) -> bytes:
+    figure.savefig(file := BytesIO(), format="png", dpi=100)
     return file.getvalue()
-
-
-def image_tag(name: str, figure: MatplotlibFigure, dpi: int = 100) -> str:
-    """The figure as an image inside HTML."""
-    picture = b64encode(as_png(figure, dpi)).decode()
-    return f'<img alt="{name}" src="data:image/png;base64,{picture}">'
 
 
 def plot(result: object, axes: Axes | None = None) -> Axes:
     """Draw the main picture of a result; return the axes.
 
-    result : a Contact: map of pressure; ShearState, VectorShearState: map of stick and slip;
-        Cycle: loop, or the plane of loads if the normal load varies; Fretting: map of slip
-        amplitudes; LoadPath: shear force against displacement, or the plane of loads if the load
-        varies; MemoryCurve: the plane of loads; Gradient: map of derivatives; Verdict: map of
-        proved statuses with marks on wrong claims; Comparison: times of the solvers;
-        PhaseLosses: loss against phase; Shakedown: map of factors, or of slips for the kind
-        "vector"; Surface, Summits: map; Provability: contacts against pruning
+    result : an object of a class in `PICTURES`; docs/how-to/results.md, "Plots", lists the pictures
     axes   : matplotlib axes; default: those of a new figure, which notebooks and `pyplot.show` show
 
     Raises InputError for anything else.
@@ -172,28 +148,9 @@ def plot(result: object, axes: Axes | None = None) -> Axes:
     if isinstance(contact, Contact) and not contact.loads.any():
         say_nothing(axes)
     else:
-        _draw(where, axes, result)
+        module, function = where.split(".")
+        getattr(import_module(f"convexrough.plots.{module}"), function)(axes, result)
     return axes
-
-
-def _draw(where: str, axes: Axes, *what: object) -> None:
-    module, function = where.split(".")
-    getattr(import_module(f"convexrough.plots.{module}"), function)(axes, *what)
-
-
-def thumbnail(result: object) -> str:
-    """A small picture of a result, as an HTML image; of a cycle or path, the map of statuses.
-
-    >>> print(cr.plots.thumbnail(contact)[:36])
-    <img alt="Contact" src="data:image/p
-    """
-    figure, (axes,) = panels(SINGLE, 3.0)
-    if isinstance(result, (Cycle, LoadPath)) and result.contact.loads.any() and len(result.forces):
-        status = result.status if isinstance(result, Cycle) else result.status[-1]
-        _draw("asperity_map.draw_statuses", axes, result.contact, status)
-    else:
-        plot(result, axes)
-    return image_tag(type(result).__name__, figure, 80)
 
 
 def save(

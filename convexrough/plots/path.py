@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
@@ -49,15 +47,14 @@ def path_figures(path: LoadPath) -> Figures:
     scale, fine = Scale(path.contact), _finer(path)
     height, columns = (3.0, 2) if path.load_constant else (3.2, 3)
     figure, (*plane, loop, cost) = panels(DOUBLE, height, 1, columns, gridspec_kw={"wspace": 0.06})
-    for axes in plane:
-        _draw_path(axes, path)
     _draw_loop(loop, path, scale, fine)
     _draw_cost(cost, path, scale, fine)
     figure.supxlabel(scale.footnote(), fontsize=TICK)
     if path.load_constant:
         style.title(cost, "energy lost since the beginning")
-        return Figures({"history": figure})
-    return Figures({"path": figure, "path_stick_slip": _maps(path, scale)})
+        return Figures(history=figure)
+    _draw_path(plane[0], path)
+    return Figures(path=figure, path_stick_slip=_maps(path, scale))
 
 
 def draw_loop_or_plane(axes: Axes, path: LoadPath) -> None:
@@ -87,7 +84,7 @@ def _draw_cost(axes: Axes, path: LoadPath, scale: Scale, fine: LoadPath) -> None
         axes.plot(np.arange(1.0, m + 1), energy.of(path.losses), "o", ms=3.5, color=ink())
     else:
         style.bar(axes, colours, "step", above=True)
-    axes.set(xlim=(0, max(1, m)))
+    axes.set_xlim(0, m)
     axes.set_ylim(bottom=0.0)
     axes.xaxis.set_major_locator(style.round_ticks(8, whole=True))
     style.label(axes, "step", energy.label("W"))
@@ -95,15 +92,13 @@ def _draw_cost(axes: Axes, path: LoadPath, scale: Scale, fine: LoadPath) -> None
 
 def _draw_darkening(axes: Axes, path: LoadPath, x: Array, y: Array) -> ScalarMappable:
     """Draw a curve that darkens from its start at the origin to its end; return the colours."""
-    steps = max(1, len(path.forces))
+    steps = len(path.forces)
     colours = ScalarMappable(Normalize(0, steps), ListedColormap(style.shades_of(256, low=0.15)))
     points = np.column_stack((np.append(0.0, x), np.append(0.0, y)))
     pieces = list(np.stack((points[:-1], points[1:]), axis=1))
     shades = colours.to_rgba(np.linspace(0, steps, len(pieces) + 1)[1:])
-    axes.add_collection(
-        LineCollection(pieces, colors=shades, linewidths=1.2, capstyle="round",
-                       rasterized=len(pieces) > MOST_POINTS)
-    )  # fmt: skip
+    many = len(pieces) > MOST_POINTS
+    axes.add_collection(LineCollection(pieces, colors=shades, linewidths=1.2, rasterized=many))
     axes.autoscale_view()
     return colours
 
@@ -114,24 +109,17 @@ def _mark_points(axes: Axes, x: Array, y: Array) -> None:
         axes.plot(x, y, "o", ms=3.5, color=ink(), clip_on=False, zorder=3)
     if len(x) > MOST_NUMBERS:
         return
+    spans = np.array([np.ptp(x) or 1.0, np.ptp(y) or 1.0])
     inches = 0.75 * np.array(axes.bbox.size) / axes.figure.dpi  # about those after layout
-    spots = np.column_stack((x, y)) / (np.array([np.ptp(x) or 1.0, np.ptp(y) or 1.0]) / inches)
+    spots = np.column_stack((x, y)) / spans * inches / (0.22, 0.15)  # about sizes of labels
     groups: dict[int, list[int]] = {}
     for i, spot in enumerate(spots):
-        near = [j for j in groups if np.hypot(*(spots[j] - spot)) < 0.06]
-        groups.setdefault(near[0] if near else i, []).append(i)
-    taken = [spots[i] for i in groups]
-    sides = np.deg2rad([90, -90, 45, -45, 135, -135, 0, 180])
+        near = (j for j in groups if np.abs(spots[j] - spot).max() < 1)
+        groups.setdefault(next(near, i), []).append(i)
+    box = {"boxstyle": "round,pad=0.15", "fc": axes.get_facecolor(), "ec": ink(), "lw": 0.6}
     for i, group in groups.items():
         text = ", ".join(str(1 + each) for each in group)
-        reach = 0.12 + 0.03 * len(text) * np.abs(np.cos(sides))
-        places = spots[i] + np.column_stack((np.cos(sides), np.sin(sides))) * reach[:, None]
-        clear = [min(float(np.hypot(*(place - each))) for each in taken) for place in places]
-        best = next((k for k, gap in enumerate(clear) if gap > 0.11), int(np.argmax(clear)))
-        taken.append(places[best])
-        offset = tuple((places[best] - spots[i]) * 72.0)
-        look = {"ha": "center", "va": "center", "path_effects": style.halo()}
-        style.note(axes, text, (x[i], y[i]), offset, **look)
+        axes.text(x[i], y[i], text, fontsize=TICK - 1, ha="center", va="center", bbox=box)
 
 
 def _maps(path: LoadPath, scale: Scale) -> Figure:
@@ -168,21 +156,16 @@ def _finer(path: LoadPath) -> LoadPath:
     The path is unchanged if these points cost too much, if order fails, if nothing touches, or if a
     path of varying load starts from a pressed contact. The function may solve normal problems.
     """
-    m, touching = len(path.forces), max(1, int(np.count_nonzero(path.contact.loads)))
-    each = min(MOST_POINTS, AFFORDABLE // touching) // max(1, m)
-    if not path.load_constant:
-        each = min(each, 8) if m <= MOST_SEGMENTS else 1
-    each = min(each, MOST_BETWEEN)
-    follows_on = path.load_constant or path.start == 0.0  # it does not start from another contact
-    if each < 2 or path.order == "fails" or not path.contact.loads.any() or not follows_on:
+    m, touching = max(1, len(path.forces)), max(1, int(np.count_nonzero(path.contact.loads)))
+    most = MOST_BETWEEN if path.load_constant else 8 if m <= MOST_SEGMENTS else 1
+    each = min(MOST_POINTS // m, AFFORDABLE // touching // m, most)
+    starts_here = path.load_constant or path.start == 0.0
+    if each < 2 or path.order == "fails" or not path.contact.loads.any() or not starts_here:
         return path
-    corners = np.column_stack((path.loads, path.forces))
-    part = _parts(each)[:-1]
-    pieces = [
-        np.vstack((a + part[:, None] * (b - a), b))
-        for a, b in pairwise(np.vstack(([path.start, 0.0], corners)))
-    ]
-    P, Q = np.concatenate(pieces).T
+    ends = np.vstack(([path.start, 0.0], np.column_stack((path.loads, path.forces))))
+    steps = np.diff(ends, axis=0)[:, None] * _parts(each)[:, None]
+    P, Q = (ends[:-1, None] + steps).reshape(-1, 2).T
+    P[each - 1 :: each], Q[each - 1 :: each] = path.loads, path.forces
     if path.load_constant:
         return history(path.contact, forces=Q)
     limit = (path.scene.friction or 1.0) * P

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -116,7 +117,7 @@ def _draw_peaks(axes: Axes, scale: Scale) -> None:
     touching = scale.contact.loads > 0
     r = scale.length.of(scale.distances[touching])
     peaks = scale.pressure.of(fields.peak_pressures(scale.contact)[touching])
-    _draw_points(axes, r, peaks, float(peaks.max()), "peaks of all")
+    _draw_points(axes, r, peaks, "peaks of all")
     _draw_smooth(axes, scale, sorted(set(scale.axes)), np.abs(TOWARDS_RIM[40:]))
     reach = max([scale.typical, *scale.axes])
     axes.set_xlim(0.0, 1.05 * max(float(r.max()), scale.length.of(reach)))
@@ -131,25 +132,19 @@ def _draw_smooth(axes: Axes, scale: Scale, semi_axes: Sequence[float], s: Array)
                   label=f"_{scale.name}" if place else scale.name)  # fmt: skip
 
 
-def _draw_points(axes: Axes, x: Array, y: Array, top: float, name: str) -> None:
-    """Draw a dot for each point or, if there are many, their median, and density up to `top`."""
+def _draw_points(axes: Axes, x: Array, y: Array, name: str) -> None:
+    """Draw a dot for each point, or the density of many and, as a line, their median."""
     if len(x) < CROWDED:
         size = float(np.clip(40.0 / np.sqrt(len(x)), 1.2, 4.0))
         axes.plot(x, y, "o", ms=size, mew=0.0, color=ROUGH, label=name, clip_on=False, zorder=3)
         return
-    columns, rows = (int(np.clip(len(x) / 50, 20, most)) for most in (80, 60))
-    span = (float(x.min()), float(x.max()))
-    count, across, up = np.histogram2d(x, y, bins=(columns, rows), range=(span, (0.0, top)))
-    most = count.max(axis=1, keepdims=True)
-    share = np.sqrt(np.divide(count, most, out=np.zeros_like(count), where=most > 0))
-    fading = LinearSegmentedColormap.from_list("density", [(1, 1, 1, 0), to_rgba(ROUGH, 0.75)])
-    axes.pcolormesh(across, up, share.T, cmap=fading, vmin=0.0, vmax=1.0, rasterized=True, lw=0)
-    column = np.clip(np.searchsorted(across, x, side="right") - 1, 0, columns - 1)
-    filled = np.unique(column)
-    middle = [np.median(y[column == each]) for each in filled]
-    axes.fill([], [], color=(*to_rgba(ROUGH)[:3], 0.4), lw=0, label=name)
-    axes.plot((across[filled] + across[filled + 1]) / 2, middle, color=ROUGH, lw=1.3,
-              label="median")  # fmt: skip
+    ends = [to_rgba(ROUGH, 0.15), to_rgba(ROUGH, 0.75)]
+    fading: Any = LinearSegmentedColormap.from_list("density", ends)
+    axes.hist2d(x, y, (80, 60), cmin=1, cmap=fading, norm="log", rasterized=True, lw=0)
+    axes.fill([], [], color=(ROUGH, 0.4), lw=0, label=name)
+    parts = np.array_split(np.argsort(x), 60)
+    middle = [(np.median(x[part]), np.median(y[part])) for part in parts]
+    axes.plot(*np.transpose(middle), color=ROUGH, lw=1.3, label="median")
 
 
 def _loads_figure(scale: Scale) -> Figure:
@@ -160,8 +155,7 @@ def _loads_figure(scale: Scale) -> Figure:
     _draw_smooth_share(axes, scale)
     sure = touching & ~unsure if touching.sum() < CROWDED else touching
     if sure.any():
-        top = float(np.quantile(share[sure], 0.9999))
-        _draw_points(axes, r[sure], share[sure], top, "touching")
+        _draw_points(axes, r[sure], share[sure], "touching")
     if unsure.any():
         axes.plot(r[unsure], share[unsure], "x", ms=4, mew=0.8, color=UNSURE, label="undecided",
                   clip_on=False, rasterized=unsure.sum() >= CROWDED, zorder=3)  # fmt: skip

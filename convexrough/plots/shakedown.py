@@ -74,47 +74,40 @@ def _fall(found: Shakedown, along: Array, across: Array) -> Array:
     Asperities that first touch above the load L* slide or open in every cycle.
     """
     p, t = found.load_amplitudes, found.force_amplitudes / (found.scene.friction or 1.0)
-    reached = [
-        (-(along[..., None] * p + sign * across[..., None] * t)).max(axis=-1)
-        for sign in (1.0, -1.0)
-    ]
-    return np.asarray(sum(reached) / (2.0 * found.load))
+    sides = (along[..., None] * p + sign * across[..., None] * t for sign in (1.0, -1.0))
+    return np.asarray(-sum(side.min(axis=-1) for side in sides) / (2.0 * found.load))
 
 
 def _map(found: Shakedown) -> Figure:
     """The map: how many asperities slide or open in every cycle; hatched where |Q| > f P."""
     figure, (axes,) = panels(SINGLE, 3.4)
     limit = (found.scene.friction or 1.0) * found.load
-    p, t = found.load_amplitudes, found.force_amplitudes
-    unit_p, unit_t = np.ptp(p) / 2.0 / found.load, np.ptp(t) / 2.0 / limit
-    varies, centre = unit_p > 0, float(found.force) / limit
-    part = (np.arange(FINE) + 0.5) / FINE
+    p, t = found.load_amplitudes / found.load, found.force_amplitudes / limit
+    unit_p, unit_t, mean = np.ptp(p) / 2.0, np.ptp(t) / 2.0, float(found.force) / limit
+    varies, part = unit_p > 0, (np.arange(FINE) + 0.5) / FINE
     x, y = np.meshgrid(part, part)
-    mean = np.full_like(x, centre) if varies else x
     along = x / unit_p if varies else np.zeros_like(x)
     across = y / unit_t if unit_t > 0 else np.zeros_like(y)
-    P = 1.0 + along[..., None] * p / found.load
-    T = mean[..., None] + across[..., None] * t / limit
-    borne = (np.abs(T) <= P).all(axis=-1)
+    T = (np.full_like(x, mean) if varies else x)[..., None] + across[..., None] * t
+    borne = (np.abs(T) <= 1.0 + along[..., None] * p).all(axis=-1)
     # The loads, over P0, at which the asperities with a known factor first touch.
     fall = float(_fall(found, np.array(1.0), np.array(1.0)))
     onsets = np.sort(1.0 - found.factors[np.isfinite(found.factors)] * fall)
-    level = 1.0 - _fall(found, along, across)
-    sliding = len(onsets) - np.searchsorted(onsets, level, side="right")
+    sliding = len(onsets) - np.searchsorted(onsets, 1.0 - _fall(found, along, across), side="right")
     filled = axes.pcolormesh(part, part, np.ma.masked_where(~borne, sliding), cmap=COLOURS, vmin=0,
                              vmax=len(onsets), rasterized=True)  # fmt: skip
     axes.patch.set(hatch="////", edgecolor=FAINT, facecolor="white")
     slides = np.where(borne, sliding > 0, np.nan).astype(float)
     if np.nanmin(slides) < np.nanmax(slides):
         axes.contour(x, y, slides, [0.5], colors=UNSURE, linewidths=1.4)
-    at, across_label = centre, "mean shear $Q_0\\,/\\,(fP_0)$"
     if varies:
-        at, across_label = unit_p * found.factor, "load amplitude / $P_0$"
         reach = np.array([0.0, 1.0 / max(unit_p, unit_t)])
         axes.plot(unit_p * reach, unit_t * reach, color=SMOOTH, lw=0.8, ls=DASHED)
+    at = unit_p * found.factor if varies else mean
     axes.plot([at], [unit_t * found.factor], "o", ms=5, mfc="white", mec=UNSURE, mew=1.4)
     axes.set(xlim=(0, 1), ylim=(0, 1), aspect="equal")
     style.bar(axes, filled, "asperities that keep sliding, or open")
+    across_label = "load amplitude / $P_0$" if varies else "mean shear $Q_0\\,/\\,(fP_0)$"
     style.label(axes, across_label, "shear amplitude / $(fP_0)$")
     style.title(axes, "hatched: gross sliding; line: limit\ndot: this path at its limit")
     return figure

@@ -44,43 +44,34 @@ def shear_figures(states: Sequence[ShearState]) -> Figures:
     if not contact.loads.any():
         return no_contact("stick_slip")
     scale, shown = Scale(contact), evenly_chosen(states, MOST_PANELS)
-    columns = maps.columns_of(len(shown))
-    lines = 1 + (columns == 4) + any(style.not_proved(state) for state in shown)
+    narrow = len(shown) > 3
+    lines = 1 + narrow + any(style.not_proved(state) for state in shown)
     figure, places = maps.tiles(len(shown), lines)
     for axes, state in zip(places, shown, strict=True):
-        draw_state(axes, state, scale)
-        _title(axes, state, scale, "\n" if columns == 4 else " ")
+        draw_state(axes, state, scale, "\n" if narrow else " ")
     x = f"{scale.length.label('x')}    ($fP$ = {style.quantity(scale.limit, scale.units.force)})"
     maps.label_tiles(figure, places, x, scale.length.short("y"))
-    handles, loc, ncols = legend_handles(shown, scale), "outside upper center", min(2 * columns, 4)
-    style.legend(figure, "outside", handles=handles, loc=loc, ncols=ncols)
+    how = {"loc": "outside upper center", "ncols": min(2 * len(shown), 4)}
+    style.legend(figure, "outside", handles=legend_handles(shown, scale), **how)
     return Figures({"stick_slip": figure})
 
 
 def draw_one_state(axes: Axes, state: State) -> None:
-    """Draw the map of a state, with a title and a legend."""
+    """Draw the map of a state with a legend."""
     scale = Scale(state.contact)
     draw_state(axes, state, scale)
-    _title(axes, state, scale, " ")
     style.legend(axes, "below", handles=legend_handles([state], scale))
 
 
-def _title(axes: Axes, state: State, scale: Scale, space: str) -> None:
-    """The title: the shear force divided by f P, and after `space` how many asperities slide."""
-    touching = state.contact.loads > 0
-    force = state.force if isinstance(state, ShearState) else np.hypot(*state.force)
-    share = f"{force / scale.limit:.4g}".replace("-", "\u2212")
-    slide = f"{np.count_nonzero(touching & (state.status == 'sliding')):,}"
-    unsure = style.not_proved(state).replace(" ", "\n", 1)
-    said = f"$Q/(fP)$ = {share}:{space}{slide} of {np.count_nonzero(touching):,} slide{unsure}"
-    style.title(axes, said, "center")
+def draw_state(axes: Axes, state: State, scale: Scale, space: str = " ") -> None:
+    """Draw contact discs, stick discs and open dots, and the outlines of the smooth contact.
 
-
-def draw_state(axes: Axes, state: State, scale: Scale) -> None:
-    """Draw contact discs, stick discs and open dots, and the outlines of the smooth contact."""
+    The title is the shear force divided by f P and, after `space`, how many asperities slide.
+    """
     layers = maps.status_layers(state.status, state.contact.contact_radii, state.stick_radii)
     maps.draw_map(axes, scale.points, scale.length, layers, outline=scale.axes)
-    left = max(1.0 - float(np.linalg.norm(state.force)) / scale.limit, 0.0)
+    force = state.force if isinstance(state, ShearState) else np.hypot(*state.force)
+    left = max(1.0 - abs(float(force)) / scale.limit, 0.0)
     if 0 < left < 1:
         stick = [scale.length.of(np.cbrt(left) * each) for each in scale.axes]
         maps.draw_outline(axes, stick, DOTTED)
@@ -89,6 +80,12 @@ def draw_state(axes: Axes, state: State, scale: Scale) -> None:
         size = float(np.clip(60.0 / np.sqrt(len(unsure)), 1.0, 4.0))
         axes.plot(*scale.length.of(unsure).T, "x", ms=size, mew=0.8, color=ink(),
                   path_effects=style.halo(), label="_undecided")  # fmt: skip
+    touching = state.contact.loads > 0
+    share = f"{force / scale.limit:.4g}".replace("-", "\u2212")
+    slide = f"{np.count_nonzero(touching & (state.status == 'sliding')):,}"
+    doubt = style.not_proved(state).replace(" ", "\n", 1)
+    said = f"$Q/(fP)$ = {share}:{space}{slide} of {np.count_nonzero(touching):,} slide{doubt}"
+    style.title(axes, said, "center")
 
 
 def legend_handles(states: Sequence[State], scale: Scale) -> list[Artist]:

@@ -25,10 +25,9 @@ from convexrough.scene.rings import evenly_chosen
 from convexrough.sphere.smooth import smooth
 from convexrough.tabular.columns import bound
 
-#: FORCES: numbers of forces of the slider, each with the largest number of touching asperities for
-#: which it is used. FEWEST_FORCES: the number for still more asperities.
-FORCES = {2_500: 101, 20_000: 51}
-FEWEST_FORCES = 21
+#: Largest and smallest number of forces of the slider; largest product with that of touching
+#: asperities, if more than the smallest number.
+FORCES, FEWEST_FORCES, STATES = 101, 21, 400_000
 
 #: MOST_DRAWN: largest number of discs, and of dots for open asperities. MOST_FOLLOWED: largest
 #: number of asperities with curves. These limits keep a page below 2 MB.
@@ -57,7 +56,7 @@ def slider_data(contact: Contact, proved: Sequence[str]) -> dict[str, Any]:
         raise InputError("slider page", found="no asperity that touches", expected="a contact")
     f, touching = checks.friction(contact.scene.friction), np.flatnonzero(contact.loads)
     limit = f * contact.load
-    count = next((n for most, n in FORCES.items() if len(touching) <= most), FEWEST_FORCES)
+    count = int(np.clip(STATES // len(touching), FEWEST_FORCES, FORCES))
     fractions = np.linspace(0.0, 1.0, count)
     steady = cycles(contact, fractions * limit)
     loading = history(contact, forces=fractions * limit)
@@ -84,7 +83,7 @@ def slider_data(contact: Contact, proved: Sequence[str]) -> dict[str, Any]:
         f"{len(shown):,} of {len(touching):,} touching asperities are drawn, chosen at random, as "
         "larger discs.": len(shown) < len(touching),
         f"{len(which):,} of the touching asperities can be selected.": len(which) < len(touching),
-        f"The slider has {count} positions.": count < next(iter(FORCES.values())),
+        f"The slider has {count} positions.": count < FORCES,
     }
     return {
         "units": contact.scene.units._asdict(),

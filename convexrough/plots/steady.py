@@ -101,13 +101,12 @@ def draw_curve(axes: Axes, curve: MemoryCurve) -> None:
     """Draw the vertices and the front of one memory curve."""
     unit = label_plane(axes, float(curve.load))
     axes.plot(*vertices(curve, unit), "o-", color=ROUGH, lw=1.4, ms=3.5)
-    if curve.front is None:
-        return
-    front = unit.of(float(curve.front))
-    axes.axvline(front, color=UNSURE, lw=0.9, ls=DASHED)
-    side, ha = (-1, "right") if curve.front > curve.load / 2 else (1, "left")
-    above = axes.get_xaxis_transform()
-    style.note(axes, "front", (front, 0.04), (3 * side, 0), xycoords=above, color=UNSURE, ha=ha)
+    if curve.front is not None:
+        front = unit.of(float(curve.front))
+        axes.axvline(front, color=UNSURE, lw=0.9, ls=DASHED)
+        side, ha = (-1, "right") if curve.front > curve.load / 2 else (1, "left")
+        look = {"xycoords": axes.get_xaxis_transform(), "color": UNSURE, "ha": ha}
+        style.note(axes, "front", (front, 0.04), (3 * side, 0), **look)
 
 
 def draw_closed(axes: Axes, found: Cycle) -> None:
@@ -116,8 +115,8 @@ def draw_closed(axes: Axes, found: Cycle) -> None:
     unit = label_plane(axes, float(found.loads.max()), found.scene.units.force)
     P, T = (np.append(each, each[0]) for each in (found.loads, found.forces / f))
     axes.plot(unit.of(P), unit.of(T), color=ROUGH, lw=1.2)
-    level, height = found.level, found.force_level / f
-    if not np.isnan(level):
+    if not np.isnan(level := found.level):
+        height = found.force_level / f
         _draw_cross(axes, unit, P.max(), level, height, color=FAINT, lw=0.9)
         axes.plot([unit.of(level)], [unit.of(height)], "o", ms=5, color=UNSURE)
         style.title(axes, "dot: $(L^*, T^*)$; no change below $L^*$")
@@ -135,18 +134,12 @@ def label_plane(axes: Axes, most: float, force_unit: str = "") -> style.Measure:
 
 
 def _draw_cross(
-    axes: Axes,
-    unit: style.Measure,
-    most: float,
-    level: float = 0.0,
-    height: float = 0.0,
-    **look: Any,
+    axes: Axes, unit: style.Measure, most: float, level: float = 0, height: float = 0, **look: Any
 ) -> None:
     """Draw the lines T = height +- (P - level) from P = level to P = most."""
-    P = np.array([level, most])
     for sign in (1.0, -1.0):
-        T = height + sign * (P - level)
-        axes.plot(unit.of(P), unit.of(T), ls=DASHED, **look)
+        T = np.array([height, height + sign * (most - level)])
+        axes.plot(unit.of(np.array([level, most])), unit.of(T), ls=DASHED, **look)
 
 
 def vertices(curve: MemoryCurve, unit: style.Measure) -> tuple[Array, Array]:

@@ -3,25 +3,25 @@
 Where the scene names its units, axes show metric units as SI units with suitable prefixes, and
 other units unchanged. Where it does not, lengths are in a_H and pressures in p0 (contact radius and
 peak pressure of the smooth sphere under the same load), shear forces in f P, and displacements and
-energies in X0 and W0 of `Scale`. Where there is no finite smooth contact, lengths are in the radius
-r_c of the circle that holds all contacts, and pressures in the mean pressure on this circle.
+energies in X0 and W0 of `Scale`. Where there is no finite smooth contact, lengths and pressures are
+unchanged.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from functools import cached_property
 from typing import Any, Literal, NamedTuple
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import to_rgb
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import AbstractPathEffect, withStroke
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import LogFormatterSciNotation, LogLocator, MaxNLocator, NullFormatter
 from numpy.typing import NDArray
 
 from convexrough import checks
@@ -42,6 +42,7 @@ DASHED, DOTTED = (0, (4, 2.5)), (0, (1, 1.5))
 #: Options of the legends of axes, and of those of figures ("outside" all axes), by their places.
 LEGENDS: dict[str, dict[str, Any]] = {
     "inside": dict(loc="upper left"),
+    "corner": dict(loc="lower left", fontsize=TICK - 1, frameon=True, handletextpad=0.2),
     "above": dict(loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=3, borderpad=0.2,
                   columnspacing=1.0, handletextpad=0.4, handlelength=1.6),
     "below": dict(loc="upper center", bbox_to_anchor=(0.45, -0.2), ncols=2, fontsize=TICK - 1,
@@ -101,6 +102,15 @@ def round_ticks(most: int = 6, *, whole: bool = False) -> MaxNLocator:
     return MaxNLocator(most, steps=[1, 2, 5, 10], integer=whole)
 
 
+def log_ticks(axis: Axis, most: int = 6) -> None:
+    """At most so many ticks of a logarithmic axis: powers of ten and, if it is short, 2 and 5."""
+    low, high = axis.get_view_interval()
+    short = high < 50 * low
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if short else (1.0,), numticks=most))
+    axis.set_major_formatter("{x:,g}" if short else LogFormatterSciNotation())
+    axis.set_minor_formatter(NullFormatter())
+
+
 def note(axes: Axes, text: str, place: Any, offset: Any, **look: Any) -> None:
     """Write a text near a place, at an offset in points."""
     how = {"textcoords": "offset points", "fontsize": TICK, **look}
@@ -114,13 +124,9 @@ def write_beside(axes: Axes, text: str, place: Any) -> None:
 
 
 def say_nothing(axes: Axes, why: str = "no contact") -> None:
-    """Write a reason into an empty panel, and remove the ticks."""
-    axes.set(xticks=[], yticks=[])
-    write_inside(axes, why)
-
-
-def write_inside(axes: Axes, why: str) -> None:
-    """Write a text into the middle of a panel."""
+    """Write a reason into the middle of a panel, and remove the ticks of an empty one."""
+    if not axes.has_data():
+        axes.set(xticks=[], yticks=[])
     axes.text(0.5, 0.5, why, transform=axes.transAxes, fontsize=LABEL, ha="center", va="center",
               path_effects=halo())  # fmt: skip
 
@@ -129,8 +135,7 @@ def not_proved(state: Any) -> str:
     """A text in brackets on what is not proved about a state or contact; "" if all is proved."""
     if state.certificate.scope == "none":
         return " (not proved)"
-    unsure = np.count_nonzero(state.status == "undecided")
-    return f" ({unsure:,} undecided)" if unsure else ""
+    return f" ({n:,} undecided)" if (n := (state.status == "undecided").sum()) else ""
 
 
 def doubtful(state: Any) -> NDArray[np.bool_]:
@@ -179,9 +184,8 @@ def measure(size: float, unit: str, symbol: str = "") -> Measure:
     """
     if known := _metric(unit):
         name, exponent = known
-        si, step = abs(size) * 10.0**exponent, 0  # a power of a thousand scales it to 1 to 1000
-        if si and math.isfinite(si):
-            step = int(np.clip(math.floor(math.log10(si * (1 + 1e-12)) / 3), -5, 4))
+        si = abs(size) * 10.0**exponent or 1.0  # a power of a thousand scales it to 1 to 1000
+        step = int(np.clip(math.floor(math.log10(si * (1 + 1e-12)) / 3), -5, 4))
         return Measure(10.0 ** (3 * step - exponent), "", f"{PREFIXES[step + 5]}{name}")
     if unit or not symbol:
         return Measure(1.0, "", unit)
@@ -193,9 +197,9 @@ def quantity(value: float, unit: str) -> str:
     if value and _metric(unit):
         prefixed = measure(float(f"{value:.3g}"), unit)
         return f"{prefixed.of(value):.3g} {prefixed.said}"
-    digits, _, power = f"{value:.2e}".partition("e")
-    plain = value == 0 or -3 < int(power) < 3
-    number = f"{value:.3g}" if plain else f"${digits}\\times 10^{{{int(power)}}}$"
+    number, _, power = f"{value:.3g}".partition("e")
+    if power:
+        number = f"${number}\\times 10^{{{int(power)}}}$"
     return f"{number} {literal(unit)}".strip()
 
 
@@ -218,36 +222,33 @@ class Scale:
 
     sphere : the smooth sphere or ellipsoid, or None;  name : its name in legends
     points, length : (n, 2) [length] the contact points, and the measure of lengths
-    axes   : semi-axes [length] of the smooth contact, or ();  centre : (2,) origin of distances
-    typical, peak : radius and peak pressure of the smooth contact, or r_c and mean pressure
+    axes   : semi-axes [length] of the smooth contact, or ()
+    typical, peak : radius and peak pressure of the smooth contact, or of the circle about the
+        origin that holds all contacts, and of the asperities
     """
 
     def __init__(self, contact: Contact) -> None:
         self.contact, self.units = contact, contact.scene.units
-        self.points, load = contact.scene.contact_points, contact.load
-        self.sphere = smooth_reference(contact.scene, load) if load else None
-        self.name, self.centre = "smooth sphere", np.zeros(2)
-        self.axes: Sequence[float] = ()
+        self.points = contact.scene.contact_points
+        self.sphere = smooth_reference(contact.scene, contact.load) if contact.load else None
+        self.name, symbols, self.axes = "smooth sphere", ("", ""), tuple[float, ...]()
+        most = float(peak_pressures(contact).max())
         if self.sphere is not None:
             self.typical, self.peak = self.sphere.contact_radius, self.sphere.peak_pressure
-            self.axes = (self.typical, self.typical)
+            symbols, self.axes = ("a_H", "p_0"), (self.typical, self.typical)
             if isinstance(self.sphere, SmoothEllipsoid):
                 self.name, self.axes = "smooth ellipsoid", self.sphere.semi_axes
         else:
-            if load:
-                self.centre = contact.loads @ self.points / load
-            rims = np.hypot(*(self.points - self.centre).T) + contact.contact_radii
-            self.typical = float(rims[contact.loads > 0].max(initial=0.0))
-            self.peak = load / (np.pi * self.typical**2) if load else 0.0
-        symbols = ("a_H", "p_0") if self.sphere else ("r_c", "\\bar p")
+            rims = (self.distances + contact.contact_radii)[contact.loads > 0]
+            self.typical, self.peak = float(rims.max(initial=0.0)), most
         self.length = measure(self.typical, self.units.length, symbols[0])
-        pressure, most = self.units.name("pressure"), peak_pressures(contact).max()
-        self.pressure = measure(float(most) if pressure else self.peak, pressure, symbols[1])
+        pressure = self.units.name("pressure")
+        self.pressure = measure(most if pressure else self.peak, pressure, symbols[1])
 
     @property
     def distances(self) -> Array:
-        """(n,) [length] distances of all contact points from the centre."""
-        return np.asarray(np.hypot(*(self.points - self.centre).T))
+        """(n,) [length] distances of all contact points from the origin."""
+        return np.asarray(np.hypot(*self.points.T))
 
     @cached_property
     def limit(self) -> float:
@@ -260,9 +261,9 @@ class Scale:
         if self.sphere is not None:
             return float(self.sphere.displacement(self.limit))
         scene = self.contact.scene  # X0 = c_t f times the approach from first touch
-        c_t = float(mindlin.ratio(scene.material.poisson_ratio))
         first = self.contact.approach + float(scene.offsets.max())
-        return checks.friction(scene.friction) * c_t * first
+        c_t = float(mindlin.ratio(scene.material.poisson_ratio))
+        return c_t * checks.friction(scene.friction) * first
 
     @property
     def work(self) -> float:
@@ -281,8 +282,7 @@ class Scale:
 
     def energy(self, largest: float) -> Measure:
         """The measure of energies up to the largest."""
-        unit = self.units.name("work")
-        symbol = "W_0" if self.sphere else "(4.8\\,fPX_0)"
+        unit, symbol = self.units.name("work"), "W_0" if self.sphere else "(4.8\\,fPX_0)"
         return measure(largest if unit else self.work, unit, symbol)
 
     def footnote(self) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
-from matplotlib.ticker import LogLocator, NullFormatter, NullLocator
+from matplotlib.ticker import NullLocator
 
 from convexrough import checks
 from convexrough.arrays import Array
@@ -56,14 +56,10 @@ def surface_figures(
     checks.instance("surface", surface, Surface)
     checks.instance("maxima", maxima, Summits)
     checks.instance("summits", summits, Summits)
-    if curve is not None:
-        checks.instance("curve", curve, Provability)
-    if contact is not None:
-        checks.instance("contact", contact, Contact)
-    figures = Figures({"map": _map(surface, summits, contact)})
+    figures = Figures(map=_map(surface, summits, contact))
     figures["histograms"] = _histograms(surface, maxima, summits)
     if curve is not None:
-        figures["provability"] = _provability_figure(curve, summits.origin.prune, surface.unit)
+        figures["provability"] = _provability_figure(curve, summits.origin.prune)
     return figures
 
 
@@ -95,14 +91,11 @@ def draw_provability(axes: Axes, curve: Provability) -> None:
     # A logarithmic axis cannot show 0.
     _draw_by_scope(axes, curve, np.where(curve.contacts > 0, curve.contacts, np.nan), "contacts")
     axes.set_yscale("log")
-    lowest, highest = axes.get_ylim()
-    axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if highest < 300 * lowest else (1,)))
-    axes.yaxis.set_major_formatter("{x:,g}")
-    axes.yaxis.set_minor_formatter(NullFormatter())
+    style.log_ticks(axes.yaxis)
     style.label(axes, "pruning  [% of $Sz$]", "number")
 
 
-def _provability_figure(curve: Provability, chosen: float, unit: str) -> Figure:
+def _provability_figure(curve: Provability, chosen: float) -> Figure:
     """The figure of contacts, crowding and model error against pruning, with a dotted line at the
     chosen one. Prunings below the smallest at which the assumptions of the asperity model are met
     are shaded."""
@@ -120,14 +113,12 @@ def _provability_figure(curve: Provability, chosen: float, unit: str) -> Figure:
     lower.set_xlabel(upper.get_xlabel(), fontsize=style.LABEL)
     upper.set_xlabel("")
     first = curve.trusted_from
-    until = float(curve.prune[-1]) if np.isnan(first) else first
+    until = np.nanmin([first, curve.prune[-1]])
     for axes in (upper, middle, lower):
-        axes.axvspan(0.0, until, color="0.92", lw=0.0, zorder=0)
+        axes.axvspan(0.0, until, color="0.5", alpha=0.2, lw=0.0, zorder=0)
         axes.axvline(chosen, color=ink(), lw=0.9, ls=":")
     met = "at no pruning" if np.isnan(first) else f"from {100 * first:.3g} %"
-    tallest = curve.heights[-1] / curve.prune[-1] if curve.prune[-1] else 0.0
-    size = f"   ($Sz$ = {style.quantity(float(tallest), unit)})" if tallest else ""
-    style.title(upper, f"assumptions met {met}{size}")
+    style.title(upper, f"assumptions met {met}")
     return figure
 
 
@@ -151,23 +142,20 @@ def _draw_by_scope(axes: Axes, curve: Provability, values: Array, name: str = ""
 def _map(surface: Surface, summits: Summits, contact: Contact | None) -> Figure:
     figure, (axes,) = panels(SINGLE + 0.9, 4.1)
     image, length, z = draw_surface(axes, surface)
-    positions, handles, shown = length.of(summits.positions), [], f"{len(summits):,}"
+    style.bar(axes, image, z.short("z"), above=True)
+    positions, handles = length.of(summits.positions), []
     if contact is not None and contact.loads.any():
-        scale = Scale(contact)
-        edge = _draw_contacts(axes, scale, length)
+        edge = _draw_contacts(axes, Scale(contact), length)
         handles = [style.disc_handle(UNSURE, f"contacts ({np.count_nonzero(contact.loads):,})")]
-        if scale.axes:
-            handles.append(Line2D([], [], ls=DASHED, lw=0.9, color=ink(), label="smooth contact"))
+        handles += [Line2D([], [], ls=DASHED, lw=0.9, color=ink(), label="smooth contact")]
         positions = positions[np.abs(positions).max(axis=1) <= edge]
-        if len(positions) < len(summits):
-            shown = f"{len(positions):,} of {shown}"
         width, height = (min(edge, length.of(side / 2)) for side in surface.size)
         axes.set(xlim=(-width, width), ylim=(-height, height))
     size = float(np.clip(60.0 / np.sqrt(len(positions) + 1), 0.4, 4.0))
     axes.plot(*positions.T, "o", ms=size, mew=0.0, color=SUMMIT, zorder=0.9,  # below contacts
               rasterized=len(positions) > MANY)  # fmt: skip
-    style.bar(axes, image, z.short("z"), above=True)
-    handles.insert(0, style.disc_handle(SUMMIT, f"summits ({shown})"))
+    some = f"{len(positions):,} of " if len(positions) < len(summits) else ""
+    handles.insert(0, style.disc_handle(SUMMIT, f"summits ({some}{len(summits):,})"))
     style.legend(figure, "outside", handles=handles, loc="outside lower center", ncols=3)
     return figure
 
@@ -176,14 +164,13 @@ def _draw_contacts(axes: Axes, scale: Scale, length: style.Measure) -> float:
     """Draw contacts, smooth contact and most crowded pair; return half the width of the view."""
     contact, points = scale.contact, length.of(scale.points)
     touching, radii = contact.loads > 0, length.of(contact.contact_radii)
-    reach = np.abs(points - length.of(scale.centre)).max(axis=1) + radii
+    reach = np.abs(points).max(axis=1) + radii
     edge = 1.2 * float(max(length.of(scale.typical), reach[touching].max()))
     least = edge * float(np.clip(0.1 / np.sqrt(touching.sum()), 0.002, 0.01))
     discs = np.where(touching, np.maximum(radii, least), 0.0)
     draw_discs(axes, points, Layer("_contacts", discs, UNSURE, "white"))
     draw_outline(axes, [length.of(axis) for axis in scale.axes], colour="white")
-    pairs, _ = crowded(contact)
-    for i, j in pairs[:1]:
+    for i, j in crowded(contact)[0][:1]:
         middle = contact.scene.asperities.positions[[i, j]].mean(axis=0)
         style.write_beside(axes, f"{i}, {j}", length.of(middle))
     return edge
@@ -193,8 +180,8 @@ def _histograms(surface: Surface, maxima: Summits, summits: Summits) -> Figure:
     figure, (left, middle, right) = panels(style.DOUBLE, 2.7, 1, 3)
     moments, level = surface.moments, summits.origin.level
     unit = style.measure(float(np.abs(maxima.heights - level).max()), surface.unit)
-    edges = _bins(unit.of(maxima.heights - level))
-    _draw_both(left, edges, *(unit.of(each.heights - level) for each in (maxima, summits)))
+    heights = [unit.of(each.heights - level) for each in (maxima, summits)]
+    edges = _draw_both(left, np.linspace(heights[0].min(), heights[0].max(), 30), *heights)
     mean, spread = unit.of(moments.mean_height), unit.of(moments.height_std)
     if spread > 0:  # if 0, no Gaussian surface has these moments
         z = np.linspace(edges[0], edges[-1], 200)
@@ -205,15 +192,11 @@ def _histograms(surface: Surface, maxima: Summits, summits: Summits) -> Figure:
     style.label(left, unit.short(r"\mathrm{height}"), "summits")
 
     unit = style.measure(float(np.median(maxima.tip_radii)), surface.unit)
-    edges = 10 ** _bins(np.log10(unit.of(maxima.tip_radii)))
-    _draw_both(middle, edges, *(unit.of(each.tip_radii) for each in (maxima, summits)))
-    middle.set_xscale("log")
+    radii = [unit.of(each.tip_radii) for each in (maxima, summits)]
+    _draw_both(middle, np.geomspace(radii[0].min(), radii[0].max(), 30), *radii)
     middle.axvline(unit.of(1 / moments.mean_curvature), color=ink(), ls="--", lw=1.1)
-    span = edges[-1] / edges[0]
-    powers = LogLocator(subs=(1.0,) if span > 50 else (1.0, 3.0), numticks=5)
-    middle.xaxis.set_major_locator(powers if span > 10 else style.round_ticks(4))
-    middle.xaxis.set_major_formatter("{x:g}")
-    middle.xaxis.set_minor_formatter(NullFormatter())
+    middle.set_xscale("log")
+    style.log_ticks(middle.xaxis, most=4)
     style.label(middle, unit.short(r"\mathrm{tip\ radius}"), "")
 
     _draw_both(right, np.linspace(0.0, 1.0, 21), maxima.eccentricities, summits.eccentricities)
@@ -224,16 +207,10 @@ def _histograms(surface: Surface, maxima: Summits, summits: Summits) -> Figure:
     return figure
 
 
-def _draw_both(axes: Axes, edges: Array, maxima: Array, summits: Array) -> None:
-    bins = edges.tolist()
-    axes.hist(maxima, bins, histtype="step", lw=1.0, color=ink(), label="all maxima")
-    axes.hist(summits, bins, color=ROUGH, alpha=0.75, label="summits left by pruning")
-
-
-def _bins(values: Array) -> Array:
-    """The edges of the bins of a histogram of the values, which may all be equal."""
-    low, high = float(values.min()), float(values.max())
-    size = max(abs(low), abs(high)) or 1.0
-    room = high - low if high - low > 1e-9 * size else size
-    count = int(np.clip(np.sqrt(len(values)), 8, 40))
-    return np.linspace(low - 0.02 * room, high + 0.02 * room, count + 1)
+def _draw_both(axes: Axes, edges: Array, maxima: Array, summits: Array) -> Array:
+    """Draw both histograms; return the edges of their bins."""
+    if edges[-1] - edges[0] <= 1e-9 * abs(edges[0]):  # all are equal
+        edges = edges[0] + np.linspace(-0.5, 0.5, len(edges)) * (abs(edges[0]) or 1.0)
+    axes.hist(maxima, edges.tolist(), histtype="step", lw=1.0, color=ink(), label="all maxima")
+    axes.hist(summits, edges.tolist(), color=ROUGH, alpha=0.75, label="summits left by pruning")
+    return edges

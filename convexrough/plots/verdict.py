@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.ticker import LogLocator, NullFormatter
 
 from convexrough import checks
 from convexrough.comparison import Comparison
@@ -76,10 +75,5 @@ def draw_times(axes: Axes, comparison: Comparison) -> None:
                       va="center", fontsize=TICK, color=UNSURE)  # fmt: skip
     axes.set(xscale="log", ylim=(len(names) - 0.5, -0.5))
     axes.set_yticks(range(len(names)), names, fontsize=TICK)
-    times = [contact.seconds for contact in comparison.contacts if contact.seconds > 0]
-    if times:  # whole decades: the axis is short
-        powers = np.floor(np.log10(min(times))), np.ceil(np.log10(1.01 * max(times)))
-        axes.set_xlim(*(10.0**power for power in powers))
-        axes.xaxis.set_major_locator(LogLocator(numticks=4))
-        axes.xaxis.set_minor_formatter(NullFormatter())
+    style.log_ticks(axes.xaxis, most=4)
     style.label(axes, "time [s]", "")

@@ -129,7 +129,7 @@ class Whole(Table):
         model = self.contact
         return [
             ("load", model.load, self.load),
-            ("area of contact", float((np.pi * model.contact_radii**2).sum()), self.area),
+            ("area of contact", model.area, self.area),
             ("contacts", int(np.count_nonzero(model.loads)), self.pieces),
             ("largest load", float(model.loads.max()), float(self.loads.max())),
         ]
@@ -160,9 +160,7 @@ def press_whole(surface: Surface, contact: Contact) -> Whole:
     origin = getattr(contact.scene.asperities, "origin", None)
     there = surface.unit, surface.pixel, surface.heights.shape, surface.checksum
     if origin is None or (origin.unit, origin.pixel, origin.shape, origin.checksum) != there:
-        found = "asperities that are no summits of a map"
-        if origin is not None:
-            found = f"summits of another map (in {origin.unit or 'no unit'})"
+        found = "summits of another map" if origin else "asperities that are no summits of a map"
         expected = f"those of this map (in {surface.unit or 'no unit'}), as surface.summits() finds"
         raise InputError("contact", found=found, expected=expected)
     pressures, load = _pressed(surface, contact, 1)

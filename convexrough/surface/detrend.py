@@ -15,9 +15,8 @@ from convexrough.surface.pixels import centres
 Trend = Literal["plane", "sphere", "paraboloid"]
 TRENDS: tuple[Trend, ...] = ("plane", "sphere", "paraboloid")
 
-#: Largest number of Gauss-Newton steps to the best sphere; relative size of the last step; least
-#: eigenvalue of the correlation matrix of the terms with which pixels determine a form.
-STEPS, ENOUGH, ALIKE = 50, 1e-12, 1e-10
+#: Least eigenvalue of the correlation matrix of the terms with which pixels determine a form.
+ALIKE = 1e-10
 
 
 @dataclass(frozen=True, repr=False)
@@ -104,25 +103,18 @@ def _sphere(
 ) -> tuple[tuple[float, tuple[float, float], float], Array]:
     """The best sphere: its height, slopes and curvature in the middle, and its heights.
 
-    The parameters of z = q + k z^2 / 2, with q = a + b x + c y + k (x^2 + y^2) / 2, are found by
-    Gauss-Newton steps.
+    Its equation z = a + b x + c y + k (x^2 + y^2 + z^2) / 2 is linear in the parameters.
     """
-    z, shape, (_, x, y) = np.zeros_like(wanted), np.zeros(4), terms
-    for _ in range(STEPS):
-        factors = [*terms, (x * x + y * y + z * z) / 2]
-        step = _least_squares([each / (1 - shape[3] * z) for each in factors], wanted - z)
-        shape += step
-        a, b, c, k = shape.tolist()
-        q = a + b * x + c * y + k * (x * x + y * y) / 2
-        if min((under := 1 - 2 * k * q).min(), 1 - 2 * k * a) <= 0:
-            break
-        z = 2 * q / (1 + np.sqrt(under))
-        if np.abs(step).max() <= ENOUGH * np.abs(shape).max():
-            q0 = 2 * a / (1 + math.sqrt(1 - 2 * k * a))
-            slopes = b / (1 - k * q0), c / (1 - k * q0)
-            return (q0, slopes, 0 - k / math.sqrt(b * b + c * c + 1 - 2 * a * k)), z
-    expected = 'one that covers the map, or "plane"'
-    raise InputError("detrend", found="no sphere that fits", expected=expected)
+    _, x, y = terms
+    a, b, c, k = _least_squares([*terms, (x * x + y * y + wanted * wanted) / 2], wanted).tolist()
+    q = a + b * x + c * y + k * (x * x + y * y) / 2
+    if min((under := 1 - 2 * k * q).min(), 1 - 2 * k * a) <= 0:
+        expected = 'one that covers the map, or "plane"'
+        raise InputError("detrend", found="no sphere that fits", expected=expected)
+    q0 = 2 * a / (1 + math.sqrt(1 - 2 * k * a))
+    slopes = b / (1 - k * q0), c / (1 - k * q0)
+    curvature = 0 - k / math.sqrt(b * b + c * c + 1 - 2 * a * k)
+    return (q0, slopes, curvature), 2 * q / (1 + np.sqrt(under))
 
 
 def _least_squares(factors: list[Array], misfit: Array) -> Array:

@@ -153,25 +153,25 @@ class Surface(Record, Plottable):
         >>> print(cr.surface.Surface(rough, pixel=1.0).warnings[0].partition(",")[0])
         a sphere of radius 49.9828
         """
+        return tuple(self._doubts())
+
+    def _doubts(self) -> Iterator[str]:
         down, across = (-(-length // FITTED) for length in self.heights.shape)
         few = self._measured[::down, ::across]
-        pixel = (self.pixel[0] * across, self.pixel[1] * down)
-        known = few[~np.isnan(few)]
-        left, found = float(np.var(known)) if len(known) else 0.0, ""
+        pixel = self.pixel[0] * across, self.pixel[1] * down
+        left = whole = float(np.nanvar(few)) if np.isfinite(few).any() else 0.0
+        found = ""
         for kind in TRENDS if min(few.shape) >= 3 else ():
             try:
                 trend, there = fitted(few, pixel, kind)
             except InputError:  # no sphere covers the map, or too few pixels are measured
                 continue
             if (least := float(np.nanvar(few - there))) < (1.0 - MOST) * left:
-                name = f"a {trend!r}".partition(" in the")[0]
-                part = f"{100 * (1.0 - least / np.var(known)):.3g} %"
-                found = f"{name}, explains {part} of the variance of the heights: "
-                found += f'detrend="{kind}", or --detrend {kind}, removes it'
-                left = least
-        return (*([found] if found else []), *self._wrong_pixels())
-
-    def _wrong_pixels(self) -> Iterator[str]:
+                name, left = f"a {trend!r}".partition(" in the")[0], least
+                found = f"{name}, explains {100 * (1.0 - left / whole):.3g} % of the variance of "
+                found += f'the heights: detrend="{kind}", or --detrend {kind}, removes it'
+        if found:
+            yield found
         if (part := self.filled / self.heights.size) > 0.5:
             yield f"{part:.0%} of the pixels were holes: most of this map is not measured"
         yield from self.flaws

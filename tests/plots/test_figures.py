@@ -138,8 +138,6 @@ def test_what_cannot_be_drawn_is_refused() -> None:
     one, other = contact("paper"), contact("rough")
     two = cr.cycles(one, np.array([0.2, 0.4]) * one.load)
     loops = cr.loops(two, 40)
-    again = cr.press(PAPER, approach=one.approach)  # an equal contact
-    assert plots.cycle_figures([two[0], cr.cycle(again, maximum=0.3 * again.load)])
     assert plots.cycle_figures(two, loops=loops)
     figure: Any = Figure()
     five: Any = 5
@@ -147,8 +145,8 @@ def test_what_cannot_be_drawn_is_refused() -> None:
         (lambda: plots.shear_figures([cr.shear(it, force=0) for it in (one, other)]),
          r"states\[1\]: found a result of another contact"),
         (lambda: plots.cycle_figures([two[0], cr.cycle(other, maximum=0)]), r"\[1\]: found a res"),
-        (lambda: plots.cycle_figures(two, loops=[]), "loops: found 0, expected 2, one per cycle"),
-        (lambda: plots.cycle_figures(two, loops=loops[::-1]), r"loops\[0\]: found another loop"),
+        (lambda: plots.cycle_figures(two, loops=[]), "loops: found others, expected"),
+        (lambda: plots.cycle_figures(two, loops=loops[::-1]), "loops: found others"),
         (lambda: plots.shear_figures([five]), r"\[0\]: found type int, expected a ShearState or"),
         (lambda: plots.cycle_figures([five]), r"cycles\[0\]: found type int, expected a Cycle"),
         (lambda: plots.phase_figures(five), "found type int, expected PhaseLosses"),
@@ -227,7 +225,9 @@ def test_unknown_wear_is_grey() -> None:
     P = LARGEST["paper"]
     worn = cr.fretting(cr.steady(PAPER, loads=[P, 0.02 * P], forces=[0.2 * P, -0.005 * P]))
     fits(figure := plots.fretting_figures(worn)["fretting"])
-    assert [text.get_text() for text in figure.legends[0].texts] == ["not known"]
+    (legend,) = [axes.get_legend() for axes in figure.axes[:1]]
+    assert legend is not None
+    assert [text.get_text() for text in legend.texts] == ["not known"]
     (drawn,) = figure.axes[0].collections
     unknown = np.isnan(worn.slip_amplitudes[worn.contact.loads > 0])
     grey = np.asarray(to_rgba(UNKNOWN))
@@ -235,7 +235,7 @@ def test_unknown_wear_is_grey() -> None:
     nothing = dataclasses.replace(worn, slip_amplitudes=np.full(len(PAPER), np.nan))
     figure = nothing.plot().figure
     assert len(figure.axes) == 1  # no colour bar
-    assert [text.get_text() for text in texts(figure)].count("not known") == 2
+    assert [text.get_text() for text in texts(figure)].count("not known") == 1
 
 
 def test_dark_styles_stay_legible() -> None:
@@ -246,7 +246,7 @@ def test_dark_styles_stay_legible() -> None:
         verdict = plots.verdict_figures(cr.verify(pressed.scene, 0 * pressed.loads, load=1.0))
         dashed = pressed.plot().patches[0]
     assert path.texts[0].get_color() == "white"
-    assert path.texts[0].get_path_effects()[0]._gc["foreground"] == "black"
+    assert path.texts[0].get_bbox_patch().get_facecolor() == to_rgba("black")
     assert verdict["verdict"].axes[0].texts[0].get_color() == "black"  # in a white box
     assert dashed.get_edgecolor() == to_rgba("white")
 

@@ -31,13 +31,10 @@ def page(contact: cr.Contact) -> str:
     return slider_html(contact, pressed.lines())
 
 
-def test_the_file_needs_nothing_else_and_is_small(page: str) -> None:
+def test_states_are_those_of_shear_and_cycle(contact: cr.Contact, page: str) -> None:
+    """In the data that the page carries; it needs nothing else, and is small."""
     assert not re.search(r"https?:|\burl\(|\bimport\b|<link|<img|\bsrc=|fetch\(", page)
     assert len(page.encode()) < 200_000  # of 1 MB
-
-
-def test_states_are_those_of_shear_and_cycle(contact: cr.Contact, page: str) -> None:
-    """In the data that the page carries."""
     (found,) = re.findall(r'id="data">(.*?)</script>', page, re.S)
     data, limit = json.loads(found), 0.5 * contact.load
     states, discs = data["states"], data["discs"]
