@@ -121,6 +121,28 @@ def label_tiles(figure: Figure, places: Sequence[Axes], x: str, y: str) -> None:
     figure.supylabel(y, fontsize=style.LABEL)
 
 
+def draw_statuses(
+    axes: Axes,
+    points: Array,
+    length: style.Measure,
+    status: NDArray[np.str_],
+    radii: Number,
+    *,
+    stick: Array | None = None,
+    looks: Looks = LOOKS,
+    **how: Any,
+) -> None:
+    """Draw a disc for each status of `looks`, and the stick discs of "partial" asperities.
+
+    radii, stick : (n,) [length];  how : the options of `draw_map`
+    """
+    layers = [Layer(it, np.where(status == it, radii, 0.0), looks[it][0]) for it in looks]
+    if stick is not None:
+        there = (status == "partial") & (np.asarray(radii) > 0)
+        layers.append(Layer("stick", np.where(there, stick, 0.0), STICK))
+    draw_map(axes, points, length, layers, **how)
+
+
 def draw_values(
     axes: Axes,
     scale: Scale,
@@ -195,20 +217,6 @@ def draw_outline(
         axes.add_patch(Ellipse((0, 0), *sides, **look))
 
 
-def status_layers(
-    status: NDArray[np.str_], radii: Number, stick: Array | None = None, looks: Looks = LOOKS
-) -> list[Layer]:
-    """A layer of discs for each status, and one for the stick discs of "partial" asperities."""
-    layers = [
-        Layer(name, np.where(status == name, radii, 0.0), colour)
-        for name, (colour, _) in looks.items()
-    ]
-    if stick is not None:
-        there = (status == "partial") & (radii > 0)
-        layers.append(Layer("stick", np.where(there, stick, 0.0), STICK))
-    return layers
-
-
 def status_handles(statuses: ArrayLike, looks: Looks = LOOKS) -> list[Line2D]:
     """Legend entries for each status that occurs."""
     occur = set(np.unique(statuses).tolist())
@@ -239,10 +247,9 @@ def _draw_mosaic(axes: Axes, points: Array, shades: Array, low: Array, high: Arr
     image = np.vstack((shades, np.zeros(4)))[nearest]
     inside = ((points > low) & (points < high)).all(axis=1)
     column, row = ((points[inside] - low) / width * PIXELS).astype(int).T
-    pixel = row * PIXELS + column
-    several = np.bincount(pixel, minlength=PIXELS**2)
-    mean = np.stack([np.bincount(pixel, part, PIXELS**2) for part in shades[inside].T], axis=1)
-    crowded = several > 1
-    image.reshape(-1, 4)[crowded] = mean[crowded] / several[crowded, None]
+    sums = np.zeros((PIXELS, PIXELS, 5))
+    np.add.at(sums, (row, column), np.pad(shades[inside], ((0, 0), (0, 1)), constant_values=1.0))
+    crowded = sums[..., 4] > 1
+    image[crowded] = sums[crowded, :4] / sums[crowded, 4:]
     extent = (low[0], high[0], low[1], high[1])
     axes.imshow(image, origin="lower", extent=extent, interpolation="nearest")

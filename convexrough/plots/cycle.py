@@ -19,15 +19,13 @@ from convexrough.plots import style
 from convexrough.plots.asperity_map import draw_values
 from convexrough.plots.notebook import Figure, Figures, no_contact, one_contact, panels
 from convexrough.plots.steady import draw_closed
-from convexrough.plots.style import DASHED, DOUBLE, FAINT, ROUGH, TICK, Scale, ink
+from convexrough.plots.style import DASHED, DOUBLE, FAINT, PATTERNS, ROUGH, TICK, Scale, ink
 from convexrough.scene.rings import one_of_each_ring
 from convexrough.sphere import mindlin
 from convexrough.sphere.smooth import SmoothSphere
 
 MOST_LOOPS, MOST_ASPERITIES = 4, 6
 POINTS = 400  # number of points of a loop
-#: Line styles of the chosen asperities, from the centre outwards; distinct without colours, too.
-DASHES: list[Any] = ["-", (0, (5, 1.5)), (0, (3, 1, 1, 1)), (0, (1, 1)), (0, (7, 2, 2, 2)), "-"]
 
 
 def cycle_figures(cycles: Sequence[Cycle], *, loops: Sequence[Loop] | None = None) -> Figures:
@@ -167,9 +165,9 @@ def _draw_asperity_loops(
     kept = loop.asperities.tolist()
     for order, (name, i) in enumerate(named):
         at, limit = kept.index(i), scale.limit * scale.contact.loads[i] / scale.contact.load
-        axes.plot(scale.displacement.of(loop.asperity_displacements[:, at]),
-                  loop.asperity_forces[:, at] / limit, lw=1.1, label=name,
-                  ls=DASHES[order % len(DASHES)], color=ring_colour(order, len(named)))  # fmt: skip
+        x = scale.displacement.of(loop.asperity_displacements[:, at])
+        look = {"ls": PATTERNS[order % len(PATTERNS)], "color": ring_colour(order, len(named))}
+        axes.plot(x, loop.asperity_forces[:, at] / limit, lw=1.1, label=name, **look)
     style.label(axes, scale.displacement.short("(X_i + s_i)"), "$Q_i\\,/\\,(fP_i)$")
     for limit in (-1.0, 1.0):
         axes.axhline(limit, lw=0.5, color=FAINT, zorder=0.5)
@@ -193,9 +191,8 @@ def _loss_figure(cycles: Sequence[Cycle], scale: Scale) -> Figure:
     some = [each for each in cycles if each.maximum > each.minimum]
     amplitude = np.array([each.force_amplitude for each in some])
     rough = np.array([each.loss for each in some])
-    marks: dict[str, Any] = {"color": ROUGH, "lw": 1.2, "ms": 4 if len(some) < 30 else 2.5}
-    marks |= {"marker": "o", "ls": ""} if len(some) < 100 else {"ls": "-"}
-    marks |= {"mew": 0, "clip_on": False}
+    marks: dict[str, Any] = {"color": ROUGH, "marker": "o", "ls": "", "mew": 0, "clip_on": False}
+    marks["ms"] = float(np.clip(20.0 / np.sqrt(len(some)), 1.5, 4.0))
     q, w = scale.force, scale.energy(float(rough.max()))
     ends = q.of(scale.limit)
     t = np.geomspace(min(0.7 * amplitude[0] / scale.limit, 0.3), 1.0, 300)

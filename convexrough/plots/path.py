@@ -12,10 +12,10 @@ from convexrough import checks
 from convexrough.arrays import Array
 from convexrough.friction.path import LoadPath, history, load_path
 from convexrough.plots import style
-from convexrough.plots.asperity_map import draw_map, label_tiles, status_layers, tiles
+from convexrough.plots.asperity_map import draw_statuses, label_tiles, tiles
 from convexrough.plots.notebook import Figure, Figures, no_contact, panels
-from convexrough.plots.steady import PATTERNS, label_plane, name_statuses, vertices
-from convexrough.plots.style import DOUBLE, FAINT, TICK, Scale, ink
+from convexrough.plots.steady import label_plane, name_statuses, vertices
+from convexrough.plots.style import DOUBLE, FAINT, PATTERNS, TICK, Scale, ink
 from convexrough.scene.rings import evenly_chosen
 from convexrough.sphere import hertz
 
@@ -132,8 +132,7 @@ def _maps(path: LoadPath, scale: Scale) -> Figure:
     unit = style.measure(float(path.loads.max()), scene.units.force, "P_m")
     named = f"${unit.symbol}$" if unit.symbol else style.literal(unit.said)
     for axes, k in zip(places, chosen, strict=True):
-        layers = status_layers(path.status[k], radii[k])
-        draw_map(axes, scale.points, scale.length, layers, room=room)
+        draw_statuses(axes, scale.points, scale.length, path.status[k], radii[k], room=room)
         slide = np.count_nonzero(path.status[k] == "sliding")
         touch = np.count_nonzero(path.asperity_loads[k] > 0)
         forces = f"$P$ = {unit.of(path.loads[k]):.3g}, $Q$ = {unit.of(path.forces[k]):.3g} {named}"

@@ -27,9 +27,8 @@ def press_figures(contact: Contact) -> Figures:
     """The figures of a pressed contact; keys are file names without suffix.
 
     "pressure" : map of the contact discs; and the pressure along y = 0 with that of the smooth
-        sphere (Dini & Hills 2009, Fig. 3). If few contact discs cross this line, if asperities are
-        not on a lattice or if very many touch, the second plot shows the peak pressures of all
-        asperities against the distance from the centre
+        sphere (Dini & Hills 2009, Fig. 3). If few contact discs cross this line or if very many
+        touch, the second plot shows the peak pressures of all against the distance from the centre
     "loads"    : load of each touching asperity against its distance from the centre
 
     >>> print(*cr.plots.press_figures(contact))
@@ -50,9 +49,7 @@ def pressure_figure(scale: Scale) -> Figure:
     colours = draw_pressure(chart, contact, scale)
     chart.set_xlabel(scale.length.short("x"))
     crossed = np.count_nonzero(np.abs(scale.points[:, 1]) < contact.contact_radii)
-    touching = np.count_nonzero(contact.loads)
-    in_rows = contact.scene.lattice is not None and crossed**2 >= touching
-    if touching < CROWDED and (in_rows or crossed == touching):
+    if crossed**2 >= (touching := np.count_nonzero(contact.loads)) and touching < CROWDED:
         _draw_section(profile, scale, chart.get_xlim())
     else:
         _draw_peaks(profile, scale)

@@ -68,8 +68,9 @@ def draw_state(axes: Axes, state: State, scale: Scale, space: str = " ") -> None
 
     The title is the shear force divided by f P and, after `space`, how many asperities slide.
     """
-    layers = maps.status_layers(state.status, state.contact.contact_radii, state.stick_radii)
-    maps.draw_map(axes, scale.points, scale.length, layers, outline=scale.axes)
+    look: Any = {"stick": state.stick_radii, "outline": scale.axes}
+    radii = state.contact.contact_radii
+    maps.draw_statuses(axes, scale.points, scale.length, state.status, radii, **look)
     force = state.force if isinstance(state, ShearState) else np.hypot(*state.force)
     left = max(1.0 - abs(float(force)) / scale.limit, 0.0)
     if 0 < left < 1:

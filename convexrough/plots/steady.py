@@ -17,15 +17,12 @@ from convexrough.friction.curve import MemoryCurve
 from convexrough.friction.cycle import Cycle
 from convexrough.friction.phases import PhaseLosses
 from convexrough.plots import style
-from convexrough.plots.asperity_map import draw_map, status_handles, status_layers
+from convexrough.plots.asperity_map import draw_statuses, status_handles
 from convexrough.plots.notebook import Figure, Figures, panels
-from convexrough.plots.style import DASHED, DOUBLE, FAINT, ROUGH, TICK, UNSURE, Scale, ink
+from convexrough.plots.style import DASHED, DOUBLE, FAINT, PATTERNS, ROUGH, TICK, UNSURE, Scale, ink
 
 #: Losses are drawn for at most this many factors (sizes of elliptic paths), the largest ones.
 MOST_FACTORS = 5
-
-#: Line patterns that tell curves apart even without colour.
-PATTERNS = ("-", (0, (5, 1.5)), (0, (3, 1.2, 1, 1.2)), (0, (1, 1)), "-")
 
 
 def steady_figures(found: Cycle) -> Figures:
@@ -42,8 +39,8 @@ def steady_figures(found: Cycle) -> Figures:
     checks.instance("found", found, Cycle)
     figure, (plane, chart) = panels(DOUBLE, 3.5, 1, 2)
     draw_closed(plane, found)
-    layers = status_layers(found.status, found.contact.contact_radii)
-    draw_map(chart, found.scene.contact_points, Scale(found.contact).length, layers)
+    length, radii = Scale(found.contact).length, found.contact.contact_radii
+    draw_statuses(chart, found.scene.contact_points, length, found.status, radii)
     name_statuses(figure, found.status)
     said = "the loss does not settle"
     if not np.isnan(found.loss):

@@ -38,6 +38,8 @@ COLOURS = "viridis_r"  # darkens steadily towards the peak, so that it also read
 ROUGH, UNSURE = "#2b5c8a", "#c1440e"
 SMOOTH, FAINT = "0.15", "0.65"  # greys
 DASHED, DOTTED = (0, (4, 2.5)), (0, (1, 1.5))
+#: Line patterns that tell up to six curves apart even without colour.
+PATTERNS: Any = ("-", (0, (5, 1.5)), (0, (3, 1, 1, 1)), (0, (1, 1)), (0, (7, 2, 2, 2)), "-")
 
 #: Options of the legends of axes, and of those of figures ("outside" all axes), by their places.
 LEGENDS: dict[str, dict[str, Any]] = {

@@ -47,8 +47,7 @@ def draw_claim(axes: Axes, claim: Claim) -> None:
     """Draw the map of one claim; marks of wrong claims differ also without colours."""
     status, points = claim.status, claim.of.asperities.positions
     length = style.measure(float(np.ptp(points)), claim.of.units.length)
-    layers = maps.status_layers(status, maps.even_radius(points), looks=SHADES)
-    maps.draw_map(axes, points, length, layers)
+    maps.draw_statuses(axes, points, length, status, maps.even_radius(points), looks=SHADES)
     handles = maps.status_handles(status, SHADES)
     marked = {**claim.wrong, "undecided": claim.undecided}
     for mark, (what, those) in zip("oX^", marked.items(), strict=True):
@@ -73,7 +72,7 @@ def draw_times(axes: Axes, comparison: Comparison) -> None:
         else:
             axes.text(0.02, place, entry.outcome, transform=axes.get_yaxis_transform(),
                       va="center", fontsize=TICK, color=UNSURE)  # fmt: skip
-    axes.set(xscale="log", ylim=(len(names) - 0.5, -0.5))
+    axes.set(xscale="log", ylim=(len(names) - 0.5, -0.5), xmargin=0.1)
     axes.set_yticks(range(len(names)), names, fontsize=TICK)
     style.log_ticks(axes.xaxis, most=4)
     style.label(axes, "time [s]", "")
