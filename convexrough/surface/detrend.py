@@ -83,38 +83,29 @@ def fitted(heights: Array, pixel: tuple[float, float], kind: Trend) -> tuple[Rem
     level = float(heights[known].mean()) if known.any() else 0.0
     wanted = (heights[known] - level) / size
     terms = [np.ones_like(wanted), x, y]
+    if kind == "sphere":  # z = a + b x + c y + k (x^2 + y^2 + z^2) / 2
+        terms += [(x * x + y * y + wanted * wanted) / 2]
+    elif kind == "paraboloid":
+        terms += [x * x / 2, x * y, y * y / 2]
+    found = _least_squares(terms, wanted)
+    a, b, c, k, kxy, ky = np.append(found, np.zeros(6 - len(found))).tolist()
     if kind == "sphere":
-        (a, slopes, curvature), z = _sphere(terms, wanted)
-        removed = Removed(kind, level + size * a, slopes, (curvature / size,) * 2)
+        q = np.append(a + b * x + c * y + k * (x * x + y * y) / 2, a)  # the last: in the middle
+        if (under := 1 - 2 * k * q).min() <= 0:
+            expected = 'one that covers the map, or "plane"'
+            raise InputError("detrend", found="no sphere that fits", expected=expected)
+        z = 2 * q / (1 + np.sqrt(under))
+        z, q0 = z[:-1], float(z[-1])
+        curvature = 0 - k / math.sqrt(b * b + c * c + 1 - 2 * a * k) / size
+        slopes = b / (1 - k * q0), c / (1 - k * q0)
+        removed = Removed(kind, level + size * q0, slopes, (curvature, curvature))
     else:
-        terms += [x * x / 2, x * y, y * y / 2] if kind == "paraboloid" else []
-        found = _least_squares(terms, wanted)
-        z = np.asarray(sum(k * term for k, term in zip(found, terms, strict=True)))
-        a, b, c, kx, kxy, ky = np.append(found, np.zeros(6 - len(found))).tolist()
-        bent = principal(0.0 - np.array([[kx, kxy], [kxy, ky]]) / size)
+        z = np.asarray(sum(each * term for each, term in zip(found, terms, strict=True)))
+        bent = principal(0.0 - np.array([[k, kxy], [kxy, ky]]) / size)
         removed = Removed(kind, level + size * a, (b, c), *bent)
     there = np.full(heights.shape, np.nan)
     there[known] = level + size * z
     return removed, there
-
-
-def _sphere(
-    terms: list[Array], wanted: Array
-) -> tuple[tuple[float, tuple[float, float], float], Array]:
-    """The best sphere: its height, slopes and curvature in the middle, and its heights.
-
-    Its equation z = a + b x + c y + k (x^2 + y^2 + z^2) / 2 is linear in the parameters.
-    """
-    _, x, y = terms
-    a, b, c, k = _least_squares([*terms, (x * x + y * y + wanted * wanted) / 2], wanted).tolist()
-    q = a + b * x + c * y + k * (x * x + y * y) / 2
-    if min((under := 1 - 2 * k * q).min(), 1 - 2 * k * a) <= 0:
-        expected = 'one that covers the map, or "plane"'
-        raise InputError("detrend", found="no sphere that fits", expected=expected)
-    q0 = 2 * a / (1 + math.sqrt(1 - 2 * k * a))
-    slopes = b / (1 - k * q0), c / (1 - k * q0)
-    curvature = 0 - k / math.sqrt(b * b + c * c + 1 - 2 * a * k)
-    return (q0, slopes, curvature), 2 * q / (1 + np.sqrt(under))
 
 
 def _least_squares(factors: list[Array], misfit: Array) -> Array:

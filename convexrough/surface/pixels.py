@@ -8,13 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.sparse import coo_array, diags_array
-from scipy.sparse.csgraph import minimum_spanning_tree
 from scipy.sparse.linalg import spsolve
 
 from convexrough.arrays import Array, Indices
@@ -39,17 +37,12 @@ def centres(shape: tuple[int, ...], pixel: tuple[float, float]) -> tuple[Array, 
     return x * pixel[0], y * pixel[1]
 
 
-class Hills(NamedTuple):
-    """The maxima of a map, the tallest first."""
+def hills(heights: Array) -> tuple[Indices, Array]:
+    """The pixels that are higher than all eight neighbours, the tallest first, and prominences.
 
-    pixels: Indices  # (n, 2) row and column
-    #: (n,) [length] height above the highest pass to a taller maximum; of the tallest, above the
-    #: lowest pixel of the map
-    prominences: Array
-
-
-def hills(heights: Array) -> Hills:
-    """The pixels that are higher than all eight neighbours, and their prominences."""
+    Returns (n, 2) row and column, and (n,) [length] the height above the highest pass to a taller
+    maximum; of the tallest, above the lowest pixel of the map.
+    """
     # Pixels of equal height are ordered by position. So all maxima of a plateau but one have the
     # prominence 0, and are omitted.
     order = np.argsort(heights, axis=None, kind="stable")
@@ -60,7 +53,7 @@ def hills(heights: Array) -> Hills:
     prominences = flat[peaks] - flat[order[_passes(ranks, owners, len(peaks))]]
     prominent = prominences > 0
     pixels = np.column_stack(np.unravel_index(peaks[prominent], heights.shape))
-    return Hills(pixels, prominences[prominent])
+    return pixels, prominences[prominent]
 
 
 def _ascents(ranks: NDArray[np.intp], order: Indices) -> tuple[Indices, Indices]:
@@ -77,16 +70,11 @@ def _ascents(ranks: NDArray[np.intp], order: Indices) -> tuple[Indices, Indices]
 
 def _passes(ranks: NDArray[np.intp], owners: Indices, count: int) -> Indices:
     """(count,) rank of the highest pass from each maximum to a taller one; 0 for the tallest."""
-    # The passes are edges of the spanning tree that Kruskal's algorithm builds from the highest
-    # crossing down.
     crossings = [_crossings(ranks, owners, step) for step in PAIRS]
     first, second, rank = (np.concatenate(each) for each in zip(*crossings, strict=True))
     highest_first = np.argsort(-rank)
-    pairs, new = np.unique((first * count + second)[highest_first], return_index=True)
-    weights = (ranks.size - rank[highest_first[new]]).astype(np.float64)  # from 1: 0 is no edge
-    ends = np.array(np.divmod(pairs, count), dtype=np.intc)  # scipy < 1.17.1 accepts no other type
-    graph = coo_array((weights, tuple(ends)), shape=(count, count))
-    tree = minimum_spanning_tree(graph.tocsr()).tocoo()
+    _, new = np.unique((first * count + second)[highest_first], return_index=True)
+    kept = highest_first[np.sort(new)]  # the highest crossing of each pair of hills
 
     passes = np.zeros(count, dtype=np.intp)
     leader = list(range(count))  # for each hill, itself or a taller hill of its group
@@ -97,12 +85,13 @@ def _passes(ranks: NDArray[np.intp], owners: Indices, count: int) -> Indices:
             hill = leader[hill]
         return hill
 
-    down = np.argsort(tree.data, kind="stable")
-    edges = zip(tree.row[down].tolist(), tree.col[down].tolist(), tree.data[down], strict=True)
-    for one, other, weight in edges:
+    # Kruskal's algorithm, from the highest crossing down, builds a spanning tree of the passes.
+    edges = [each[kept].tolist() for each in (first, second, rank)]
+    for one, other, level in zip(*edges, strict=True):
         taller, lower = sorted((tallest(one), tallest(other)))
-        leader[lower] = taller
-        passes[lower] = ranks.size - int(weight)
+        if taller != lower:
+            leader[lower] = taller
+            passes[lower] = level
     return passes
 
 

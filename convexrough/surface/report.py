@@ -219,15 +219,16 @@ def _radii(radii: tuple[float, float]) -> str:
 
 
 def _describe_curve(curve: Provability, unit: str, force: str) -> list[str]:
-    height = f"height [{unit}]" if unit else "height"
-    table = [["pruning", height, "summits", "contacts", "undecided", "proof", "crowding",
-              "model error", "assumptions"]]  # fmt: skip
-    for row in rows_of(curve.columns()):
-        table.append([
-            f"{100 * row['prune']:.3g} %", f"{row['height']:.4g}", f"{row['summits']:,}",
-            f"{row['contacts']:,}", f"{row['undecided']:,}", row["scope"],
-            f"{row['crowding']:.3g}", f"{row['model_error']:.2g}", row["doubt"] or "met",
-        ])  # fmt: skip
+    columns = {
+        "pruning [%]": 100 * curve.prune,
+        in_unit("height", unit): curve.heights,
+        **curve.columns("summits", "contacts", "undecided"),
+        "proof": curve.scope,
+        "crowding": curve.crowding,
+        "model error": curve.model_error,
+        "assumptions": np.where(curve.trusted, "met", curve.doubts),
+    }
+    table = [[*columns], *zip(*(each.tolist() for each in columns.values()), strict=True)]
     first = curve.trusted_from
     met = "met at no pruning" if np.isnan(first) else f"met from a pruning of {100 * first:.3g} %"
     said = [
@@ -240,7 +241,7 @@ def _describe_curve(curve: Provability, unit: str, force: str) -> list[str]:
     at = load if 0 < heaviest <= lightest * (1 + 1e-9) else ""
     at += "approach of the pressing body from height 0: "
     at += f"{least:.6g}{f' to {most:.6g}' if most > least else ''} {unit}".rstrip()
-    return [*labelled([("pressed at", at)]), *aligned(table), "", *labelled(said)]
+    return [*labelled([("pressed at", at)]), *aligned(table, digits=3), "", *labelled(said)]
 
 
 def _describe_crowded(contact: Contact) -> Iterator[str]:

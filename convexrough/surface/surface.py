@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
-from convexrough.arrays import Array, frozen
+from convexrough.arrays import Array, Indices, frozen
 from convexrough.errors import InputError
 from convexrough.plottable import Plottable
 from convexrough.record import Record
@@ -138,8 +138,8 @@ class Surface(Record, Plottable):
         return pixels.moments_of(self.heights, self.pixel)
 
     @cached_property
-    def hills(self) -> pixels.Hills:
-        """All maxima and their prominences."""
+    def hills(self) -> tuple[Indices, Array]:
+        """(n, 2) row and column of all maxima, the tallest first, and (n,) [length] prominences."""
         return pixels.hills(self.heights)
 
     @cached_property
@@ -257,8 +257,8 @@ class Surface(Record, Plottable):
         if min(shape) < fit:
             expected = f"at least {fit} by {fit}, as fit is {fit}"
             raise InputError("map", found=f"{width} by {rows} pixels", expected=expected)
-        maxima, reach = self.hills.pixels, fit // 2
-        prominent = self.hills.prominences >= prune * self.max_height
+        (maxima, prominences), reach = self.hills, fit // 2
+        prominent = prominences >= prune * self.max_height
         inside = ((maxima >= reach) & (maxima < (rows - reach, width - reach))).all(axis=1)
         tried = maxima[prominent & inside]
         whole, columns = fit_tips(self.heights, tried, self.pixel, fit)
@@ -281,7 +281,7 @@ class Surface(Record, Plottable):
             )
             expected = "; ".join(("at least one", *self.warnings[:1]))
             raise InputError("summits", found=none, expected=expected)
-        prominences = self.hills.prominences[prominent & inside][whole]
+        prominences = prominences[prominent & inside][whole]
         return Summits(prominences=prominences, pixels=tried[whole], origin=origin, **columns)
 
 

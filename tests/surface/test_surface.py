@@ -329,20 +329,20 @@ def wolf(heights: Map) -> dict[Place, float]:
 def test_pruning_is_wolf_pruning(seed: int) -> None:
     noise = np.random.default_rng(seed).standard_normal((14, 17))
     heights = np.asarray(ndimage.gaussian_filter(noise, 0.3 * (seed % 4)))
-    found = hills(heights)
-    peaks = [(int(i), int(j)) for i, j in found.pixels]
-    assert dict(zip(peaks, found.prominences.tolist(), strict=True)) == wolf(heights)
-    assert [heights[peak] for peak in peaks] == sorted(heights[tuple(found.pixels.T)])[::-1]
+    pixels, prominences = hills(heights)
+    peaks = [(int(i), int(j)) for i, j in pixels]
+    assert dict(zip(peaks, prominences.tolist(), strict=True)) == wolf(heights)
+    assert [heights[peak] for peak in peaks] == sorted(heights[tuple(pixels.T)])[::-1]
 
 
 def test_a_plateau_is_one_hill() -> None:
     heights = np.zeros((9, 9))
     heights[2:4, 2:7] = heights[2:7, 5:7] = 1.0  # an L
     heights[6, 1] = 0.5
-    found = hills(heights)
-    assert found.prominences.tolist() == [1.0, 0.5]
-    assert heights[tuple(found.pixels[0])] == 1.0
-    assert found.pixels[1].tolist() == [6, 1]
+    pixels, prominences = hills(heights)
+    assert prominences.tolist() == [1.0, 0.5]
+    assert heights[tuple(pixels[0])] == 1.0
+    assert pixels[1].tolist() == [6, 1]
 
 
 @pytest.mark.parametrize("across", [3, 5, 7])
