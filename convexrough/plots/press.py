@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -26,9 +25,9 @@ TOWARDS_RIM = np.sin(np.linspace(-np.pi / 2, np.pi / 2, 81))
 def press_figures(contact: Contact) -> Figures:
     """The figures of a pressed contact; keys are file names without suffix.
 
-    "pressure" : map of the contact discs; and the pressure along y = 0 with that of the smooth
-        sphere (Dini & Hills 2009, Fig. 3). If few contact discs cross this line or if very many
-        touch, the second plot shows the peak pressures of all against the distance from the centre
+    "pressure" : map of the contact discs; and the pressure along the line of constant y through the
+        touching asperity nearest to the centre, with that of the smooth sphere (Dini & Hills 2009,
+        Fig. 3)
     "loads"    : load of each touching asperity against its distance from the centre
 
     >>> print(*cr.plots.press_figures(contact))
@@ -44,17 +43,24 @@ def press_figures(contact: Contact) -> Figures:
 def pressure_figure(scale: Scale) -> Figure:
     """Map and profile of the pressure."""
     contact = scale.contact
-    figure, (chart, profile) = map_and_profile()
-    style.label(profile, scale.length.label("x"), scale.pressure.label("p"))
+    figure, (chart, axes) = map_and_profile()
     colours = draw_pressure(chart, contact, scale)
     chart.set_xlabel(scale.length.short("x"))
-    crossed = np.count_nonzero(np.abs(scale.points[:, 1]) < contact.contact_radii)
-    if crossed**2 >= (touching := np.count_nonzero(contact.loads)) and touching < CROWDED:
-        _draw_section(profile, scale, chart.get_xlim())
-    else:
-        _draw_peaks(profile, scale)
-    style.legend(profile, "above")
-    profile.set_ylim(0.0, 1.04 * colours.get_clim()[1])
+    y = float(scale.points[np.argmin(np.where(contact.loads > 0, scale.distances, np.inf)), 1])
+    edge = max(map(abs, chart.get_xlim())) * scale.length.size
+    x = abscissae(scale.points - (0.0, y), contact.contact_radii, edge)
+    pressure = fields.pressure(contact, np.column_stack((x, np.full_like(x, y))))
+    axes.fill_between(scale.length.of(x), scale.pressure.of(pressure), facecolor=(ROUGH, 0.2),
+                      edgecolor=ROUGH, lw=float(np.clip(3000 / len(x), 0.2, 0.9)),
+                      rasterized=len(x) > 20 * CROWDED,
+                      label=f"asperities, $y$ = {scale.length.of(y):.3g}")  # fmt: skip
+    if scale.axes:
+        smooth = hertz.pressure(np.hypot(TOWARDS_RIM, y / scale.axes[1]), 1.0, scale.peak)
+        axes.plot(scale.length.of(scale.axes[0] * TOWARDS_RIM), scale.pressure.of(smooth), "--",
+                  lw=1.3, color=ink(), label=scale.name)  # fmt: skip
+    style.label(axes, scale.length.label("x"), scale.pressure.label("p"))
+    style.legend(axes, "above")
+    axes.set(xlim=chart.get_xlim(), ylim=(0.0, 1.04 * colours.get_clim()[1]))
     return figure
 
 
@@ -95,38 +101,6 @@ def abscissae(centres: Array, radii: Array, edge: float) -> Array:
     half_chord = np.sqrt(radii[crossed] ** 2 - y[crossed] ** 2)
     places = x[crossed, None] + np.outer(half_chord, TOWARDS_RIM)
     return np.unique(np.append(places, [-edge, edge]))
-
-
-def _draw_section(axes: Axes, scale: Scale, sides: tuple[float, float]) -> None:
-    """Draw the pressure along y = 0."""
-    contact, edge = scale.contact, max(-sides[0], sides[1]) * scale.length.size
-    x = abscissae(scale.points, contact.contact_radii, edge)
-    rough = scale.pressure.of(fields.pressure(contact, np.column_stack((x, np.zeros_like(x)))))
-    axes.fill_between(scale.length.of(x), rough, facecolor=(ROUGH, 0.2), edgecolor=ROUGH,
-                      lw=float(np.clip(3000 / len(x), 0.4, 0.9)),
-                      label="asperities, $y=0$")  # fmt: skip
-    _draw_smooth(axes, scale, scale.axes[:1], TOWARDS_RIM)
-    axes.set_xlim(*sides)
-
-
-def _draw_peaks(axes: Axes, scale: Scale) -> None:
-    """Draw the peak pressure of each asperity against its distance from the centre."""
-    touching = scale.contact.loads > 0
-    r = scale.length.of(scale.distances[touching])
-    peaks = scale.pressure.of(fields.peak_pressures(scale.contact)[touching])
-    _draw_points(axes, r, peaks, "peaks of all")
-    _draw_smooth(axes, scale, sorted(set(scale.axes)), np.abs(TOWARDS_RIM[40:]))
-    reach = max([scale.typical, *scale.axes])
-    axes.set_xlim(0.0, 1.05 * max(float(r.max()), scale.length.of(reach)))
-    style.label(axes, scale.length.label("r"), scale.pressure.label("p"))
-
-
-def _draw_smooth(axes: Axes, scale: Scale, semi_axes: Sequence[float], s: Array) -> None:
-    """Draw the smooth contact's pressure at fractions s of each semi-axis."""
-    for place, axis in enumerate(semi_axes):
-        p = scale.pressure.of(hertz.pressure(s, 1.0, scale.peak))
-        axes.plot(scale.length.of(axis * s), p, "--", lw=1.3, color=ink(),
-                  label=f"_{scale.name}" if place else scale.name)  # fmt: skip
 
 
 def _draw_points(axes: Axes, x: Array, y: Array, name: str) -> None:
