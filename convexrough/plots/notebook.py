@@ -66,8 +66,7 @@ class ShownAxes(Axes):
     """Axes whose figure notebooks display, without pyplot."""
 
     def _repr_png_(self) -> bytes:
-        figure = self.get_figure()
-        assert isinstance(figure, MatplotlibFigure)
+        figure: Any = self.get_figure()
         return as_png(figure)
 
 

@@ -23,8 +23,8 @@ from convexrough.sphere import hertz
 MOST_MAPS, MOST_CURVES, MOST_NUMBERS, MOST_DOTS = 8, 4, 12, 60
 
 #: Limits when points are added: number of points; touching asperities times points; steps between
-#: two given points; at varying load, where each point needs a normal solution, number of segments.
-MOST_POINTS, AFFORDABLE, MOST_BETWEEN, MOST_SEGMENTS = 500, 16_000, 40, 24
+#: two given points, at constant load and at varying load, where each needs a normal solution.
+MOST_POINTS, AFFORDABLE, MOST_BETWEEN, MOST_VARYING = 500, 16_000, 40, 8
 
 
 def path_figures(path: LoadPath) -> Figures:
@@ -156,7 +156,7 @@ def _finer(path: LoadPath) -> LoadPath:
     path of varying load starts from a pressed contact. The function may solve normal problems.
     """
     m, touching = max(1, len(path.forces)), max(1, int(np.count_nonzero(path.contact.loads)))
-    most = MOST_BETWEEN if path.load_constant else 8 if m <= MOST_SEGMENTS else 1
+    most = MOST_BETWEEN if path.load_constant else MOST_VARYING
     each = min(MOST_POINTS // m, AFFORDABLE // touching // m, most)
     starts_here = path.load_constant or path.start == 0.0
     if each < 2 or path.order == "fails" or not path.contact.loads.any() or not starts_here:

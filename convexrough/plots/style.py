@@ -186,7 +186,8 @@ def measure(size: float, unit: str, symbol: str = "") -> Measure:
     """
     if known := _metric(unit):
         name, exponent = known
-        si = abs(size) * 10.0**exponent or 1.0  # a power of a thousand scales it to 1 to 1000
+        si = abs(size) * 10.0**exponent  # a power of a thousand scales it to 1 to 1000
+        si = si if 0 < si < math.inf else 1.0
         step = int(np.clip(math.floor(math.log10(si * (1 + 1e-12)) / 3), -5, 4))
         return Measure(10.0 ** (3 * step - exponent), "", f"{PREFIXES[step + 5]}{name}")
     if unit or not symbol:

@@ -6,7 +6,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
-from matplotlib.ticker import NullLocator
 
 from convexrough import checks
 from convexrough.arrays import Array
@@ -24,9 +23,6 @@ MANY = 1000
 
 #: Colour of summits, bright on every grey.
 SUMMIT = "#ffd24a"
-
-#: Labelled ticks of the pruning axis, as fractions of Sz.
-PRUNINGS = (0.0, 0.01, 0.05, 0.1, 0.2, 0.3, 0.5)
 
 #: Mark and colour for each scope of a certificate. The shapes differ for print without colours.
 SCOPES = {"global": ("o", ROUGH), "local": ("s", ROUGH), "none": ("X", UNSURE),
@@ -87,7 +83,7 @@ def draw_summit_map(axes: Axes, summits: Summits) -> None:
 
 def draw_provability(axes: Axes, curve: Provability) -> None:
     """Draw the number of touching summits against the pruning; marks show what is proved."""
-    axes.plot(curve.prune, curve.summits, "--", lw=1.1, color=ink(), label="summits")
+    axes.plot(range(len(curve.prune)), curve.summits, "--", lw=1.1, color=ink(), label="summits")
     # A logarithmic axis cannot show 0.
     _draw_by_scope(axes, curve, np.where(curve.contacts > 0, curve.contacts, np.nan), "contacts")
     axes.set_yscale("log")
@@ -109,14 +105,13 @@ def _provability_figure(curve: Provability, chosen: float) -> Figure:
         _draw_by_scope(axes, curve, values)
         axes.axhline(limit, color=UNSURE, lw=0.9, ls=DASHED)
         axes.set_ylim(0.0, 1.1 * max(limit, float(np.nanmax(values, initial=0.0))))
-        style.label(axes, "", name)
-    lower.set_xlabel(upper.get_xlabel(), fontsize=style.LABEL)
+        style.label(axes, upper.get_xlabel() if axes is lower else "", name)
     upper.set_xlabel("")
     first = curve.trusted_from
-    until = np.nanmin([first, curve.prune[-1]])
+    until, at = np.searchsorted(curve.prune, [first, chosen]).tolist()
     for axes in (upper, middle, lower):
-        axes.axvspan(0.0, until, color="0.5", alpha=0.2, lw=0.0, zorder=0)
-        axes.axvline(chosen, color=ink(), lw=0.9, ls=":")
+        axes.axvspan(-0.5, until - 0.5, color="0.5", alpha=0.2, lw=0.0, zorder=0)
+        axes.axvline(at, color=ink(), lw=0.9, ls=":")
     met = "at no pruning" if np.isnan(first) else f"from {100 * first:.3g} %"
     style.title(upper, f"assumptions met {met}")
     return figure
@@ -124,19 +119,17 @@ def _provability_figure(curve: Provability, chosen: float) -> Figure:
 
 def _draw_by_scope(axes: Axes, curve: Provability, values: Array, name: str = "") -> None:
     """Draw values against the pruning, with a mark for each scope, named if `name` is given."""
-    axes.plot(curve.prune, values, "-", lw=0.9, color=FAINT, zorder=1)
+    places = np.arange(len(curve.prune))
+    axes.plot(places, values, "-", lw=0.9, color=FAINT, zorder=1)
     for scope, (mark, colour) in SCOPES.items():
-        chosen = curve.scope == scope
-        if np.isfinite(values[chosen]).any():
+        chosen = (curve.scope == scope) & np.isfinite(values)
+        if chosen.any():
             said = f"{name}, proof: {scope}" if name else "_nothing"
-            axes.plot(curve.prune[chosen], values[chosen], mark, ls="", ms=4.5, mew=0.0,
-                      color=colour, label=said, clip_on=False, zorder=3)  # fmt: skip
-    top = max(float(curve.prune[-1]), PRUNINGS[1])
-    shown = [each for each in PRUNINGS if each <= top]
-    axes.set_xlim(0.0, 1.02**2 * top)
-    axes.set_xscale("function", functions=(np.sqrt, np.square))  # spreads small values, includes 0
-    axes.set_xticks(shown, [f"{100 * each:g}" for each in shown])
-    axes.xaxis.set_minor_locator(NullLocator())
+            axes.plot(places[chosen], values[chosen], mark, ls="", ms=4.5, mew=0.0, color=colour,
+                      label=said, clip_on=False, zorder=3)  # fmt: skip
+    shown = places[:: 1 + len(places) // 12]
+    axes.set_xticks(shown, [f"{100 * each:.2g}" for each in curve.prune[shown]])
+    axes.set_xlim(-0.5, len(places) - 0.5)
 
 
 def _map(surface: Surface, summits: Summits, contact: Contact | None) -> Figure:

@@ -102,13 +102,6 @@ def test_a_ridge_has_no_top() -> None:
         cr.surface.Surface(heights, 1.0).summits()
 
 
-def test_half_of_the_variance_names_a_form() -> None:
-    x, random = np.linspace(-1.0, 1.0, 64), np.random.default_rng(0)
-    heights = 0.6**0.5 * (1 / 3 - x**2) / np.std(x**2) + 0.4**0.5 * random.normal(size=(64, 64))
-    said = cr.surface.Surface(0.02 * heights, 1.0).detrend("plane").warnings[0]
-    assert said.startswith("a paraboloid")
-
-
 def test_a_map_pressed_whole_is_hertz_where_it_is_smooth() -> None:
     """Oblong pixels; load and area, and the half axes on an ellipsoid."""
     flat = cr.surface.Surface(1e-9 * RNG.standard_normal((201, 161)), (1.0, 1.2))
