@@ -19,7 +19,6 @@ from convexrough.arrays import Array, Number
 from convexrough.plots import style
 from convexrough.plots.notebook import Figure, panels
 from convexrough.plots.style import COLOURS, DASHED, DOUBLE, FAINT, SINGLE, SMOOTH, Scale, ink
-from convexrough.scene.neighbours import nearest_distances
 
 #: DENSE or more discs are stored as pixels in vector files. CROWDED or more discs are replaced by a
 #: mosaic, an image in which each pixel has the colour of the nearest asperity, or a mean.
@@ -224,10 +223,9 @@ def status_handles(statuses: ArrayLike, looks: Looks = LOOKS) -> list[Line2D]:
 
 
 def even_radius(points: Array) -> float:
-    """The radius of equal discs at points: about 0.42 of their spacing."""
+    """The radius of equal discs at points: about 0.38 of their spacing if they fill a circle."""
     size = float(np.ptp(points, axis=0).max()) or 1.0
-    apart = float(np.median(nearest_distances(points))) if len(points) > 1 else size
-    return float(np.clip(0.42 * apart, 0.006 * size, 0.05 * size))
+    return float(size * min(0.36 / np.sqrt(len(points)), 0.05))
 
 
 def _draw_mosaic(axes: Axes, points: Array, shades: Array, low: Array, high: Array) -> None:
