@@ -244,18 +244,13 @@ def _describe_curve(curve: Provability, unit: str, force: str) -> list[str]:
     return [*labelled([("pressed at", at)]), *aligned(table, digits=3), "", *labelled(said)]
 
 
-def _describe_crowded(contact: Contact) -> Iterator[str]:
+def _describe_crowded(contact: Contact) -> list[str]:
     pairs, values = crowded(contact)
-    if len(pairs):
-        count = f"pairs: {len(pairs):,}, by row of summits.csv from 0:"
-        yield from labelled([("overlapping", count)])
-        x, y = contact.scene.asperities.positions.T
-        table: list[list[Any]] = [["summits", "", "crowding", "x", "y"]]
-        for (i, j), value in list(zip(pairs, values, strict=True))[:MOST_LISTED]:
-            table.append([str(i), str(j), f"{value:.3g}", x[i], y[i]])
-        yield from (f"    {line}" for line in aligned(table))
-        if (more := len(pairs) - MOST_LISTED) > 0:
-            yield f"    and {more:,} more; --json prints all"
+    worst = list(zip(pairs.tolist(), values, strict=True))[:MOST_LISTED]
+    said = ", ".join(f"{i} and {j} ({value:.3g})" for (i, j), value in worst)
+    more = f", and {len(pairs) - len(worst):,} more pairs" if len(pairs) > len(worst) else ""
+    line = f"rows of summits.csv from 0 (and crowding): {said}{more}"
+    return labelled([("overlapping", line)]) if worst else []
 
 
 def warnings_about(scanned: Scanned) -> Iterator[str]:
