@@ -83,7 +83,7 @@ def surface_summary(scanned: Scanned) -> dict[str, Any]:
     surface, summits, origin = scanned.surface, scanned.summits, scanned.summits.origin
     moments, statistics = surface.moments, scanned.maxima.statistics
     summary: dict[str, Any] = {
-        "schema": 1,
+        "schema": 2,
         "version": __version__,
         "surface": {
             **_named(surface, "source", "comments"),
