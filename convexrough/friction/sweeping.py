@@ -15,10 +15,10 @@ than to i, and the neighbour's shell does not reach i.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,6 @@ from convexrough.arrays import Array, Indices
 from convexrough.influence.coupling import Influence
 from convexrough.roundoff import ROUNDOFF
 
-T = TypeVar("T")
 Moments = Callable[[NDArray[np.complex128]], list[Array]]
 
 
@@ -47,10 +46,8 @@ def corner(d: NDArray[np.complex128]) -> list[Array]:
     return [d.imag]
 
 
-# All numbers here are heuristics.
-
-#: Numbers of neighbours, and moments of the weights; None for weights by the linear program. They
-#: are tried until the bound 1 - q_i suffices. A try also uses the asperities that determined q_i in
+#: Numbers of neighbours, and moments of the weights; None for weights by a linear program. They are
+#: tried until the bound 1 - q_i suffices. A try also uses the asperities that determined q_i in
 #: earlier tries.
 TRIES: tuple[tuple[int, Moments | None], ...] = (
     (12, around), (10, edge), (18, around), (14, corner), (18, edge), (32, around), (32, edge),
@@ -58,12 +55,10 @@ TRIES: tuple[tuple[int, Moments | None], ...] = (
 )  # fmt: skip
 
 MORE, FEW = 32, 300  # more than MORE neighbours are tried only if at most FEW asperities remain
-ALONE = 6  # neighbours of an asperity outside the contact that are tried, each alone
-NEAR = 8  # where (8) proves (7) far away, (7) is computed for NEAR times as many as have weights,
-WIDER = 3  # and where it does not prove it then, for WIDER times as many, or else for all
-SEARCHES = 15  # systems solved for weights; each leaves out earlier neighbours of negative weight
 SAMPLE = 300  # the linear program considers about twice as many asperities
-DIRECTIONS = 256  # directions in which the extent of the support is computed
+ALONE = 6  # neighbours of an asperity outside the contact that are tried, each alone
+NEAR = 8  # where (8) proves (7) far away, (7) is computed for NEAR times as many as have weights
+SEARCHES = 15  # systems solved for weights; each leaves out earlier neighbours of negative weight
 ROWS, NUMBERS = 2**14, 2**18  # asperities treated together, and float64 numbers in an array
 
 
@@ -91,21 +86,15 @@ def swept_rates(influence: Influence, c: Array, rates: Array, spare: Array) -> A
 
 
 def _in_parts(make: Callable[..., Array], cost: int, *rows: NDArray[Any]) -> Array:
-    """make(*rows), computed in parts of about NUMBERS numbers; each row needs `cost` numbers."""
-    some = max(1, NUMBERS // cost)
-    parts = range(0, max(1, len(rows[0])), some)  # at least one part, even if `rows` are empty
-    return np.concatenate(_each(lambda k: make(*(each[k : k + some] for each in rows)), parts))
-
-
-def _each(make: Callable[[Any], T], parts: Sequence[Any]) -> list[T]:
-    """[make(part) for part in parts], computed in several threads."""
-    found: dict[int, T] = {}
+    """make(*rows), computed in threads; each row needs `cost` numbers, each part about NUMBERS."""
+    found, some = dict[int, Array](), max(1, NUMBERS // cost)
 
     def compute(k: int) -> None:
-        found[k] = make(parts[k])
+        found[k] = make(*(each[k : k + some] for each in rows))
 
-    threads.each(compute, range(len(parts)), min(threads.cores(), len(parts)))
-    return [found[k] for k in range(len(parts))]
+    parts = range(0, max(1, len(rows[0])), some)  # at least one part, even if `rows` are empty
+    threads.each(compute, parts, min(threads.cores(), len(parts)))
+    return np.concatenate([found[k] for k in parts])
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,9 +112,25 @@ class _Swept:
         return np.asarray((x - (x.min() + x.max()) / 2) + 1j * (y - (y.min() + y.max()) / 2))
 
     @cached_property
+    def plane(self) -> Array:
+        """(2, n) the same points as real coordinates."""
+        return np.stack((self.places.real, self.places.imag))
+
+    @cached_property
     def middle(self) -> np.complex128:
         """The mean of the points on the support."""
         return np.complex128(self.places[self.support].mean())
+
+    @cached_property
+    def hull(self) -> NDArray[np.complex128]:
+        """Points whose convex hull contains the support, up to 1e-9 of `extent`."""
+        from scipy.spatial import ConvexHull, QhullError  # 0.1 s to import: only when asked
+
+        points = self.places[self.support]
+        try:
+            return np.asarray(points[ConvexHull(self.plane.T[self.support]).vertices])
+        except QhullError:  # all on a line
+            return np.asarray(points)
 
     @cached_property
     def extent(self) -> float:
@@ -139,66 +144,78 @@ class _Swept:
         return 8 * (self.influence.entry_error + moved) + 128 * ROUNDOFF
 
     @cached_property
-    def plane(self) -> Array:
-        """(n, 2) the same points as real coordinates."""
-        return np.column_stack((self.places.real, self.places.imag))
-
-    @cached_property
     def _tree(self) -> Any:
-        from scipy.spatial import cKDTree  # 0.1 s to import: only when asked
+        from scipy.spatial import cKDTree
 
-        return cKDTree(self.plane[self.support])
+        return cKDTree(self.influence.points[self.support])
 
     def neighbours(self, which: Indices, count: int) -> Indices:
         """(m, count) the nearest asperities on the support to each asperity, without itself."""
         count = min(count, len(self.support) - 1)
         workers = threads.worthwhile(len(which) * count)
-        _, found = self._tree.query(self.plane[which], count + 1, workers=workers)
+        _, found = self._tree.query(self.influence.points[which], count + 1, workers=workers)
         nearest = self.support[found]  # an asperity itself comes first, at the distance 0
         own = nearest[:, :1] == which[:, None]
         return np.asarray(np.where(own, nearest[:, 1:], nearest[:, :-1]))
 
+    def apart(self, some: Indices, others: Indices, themselves: Array | float = np.inf) -> Array:
+        """Distances of asperities; from an asperity to itself, `themselves`."""
+        found, along_y = (axis[some] - axis[others] for axis in self.plane)
+        found *= found
+        found += along_y * along_y
+        np.sqrt(found, out=found)
+        np.copyto(found, themselves, where=some == others)
+        return np.asarray(found)
+
     def potentials(self, charges: Indices, places: Indices) -> Array:
         """Potentials of unit charges at places; at a charge itself, the potential of its shell."""
-        apart, along_y = (axis[charges] - axis[places] for axis in self.plane.T)
-        apart *= apart
-        along_y *= along_y
-        apart += along_y
-        np.sqrt(apart, out=apart)
-        np.copyto(apart, self.shells[charges], where=charges == places)
-        return np.asarray(1.0 / apart)
+        return np.asarray(1.0 / self.apart(charges, places, self.shells[charges]))
 
     def outside(self, which: Indices) -> Array:
         """(m,) lower bounds on rates by sweeping onto one neighbour; -inf where that fails."""
         near, here = self.neighbours(which, ALONE), self.places[which][:, None]
         away, middle = self.places[near] - here, (self.places[near] + here) / 2
-        nearer = self._least_along(away) - (away.conj() * middle).real
+        nearer = np.full(near.shape, np.inf)
+        for corner in self.hull:
+            nearer = np.minimum(nearer, (away.conj() * (corner - middle)).real)
         clear = self.shells[near] < (1 - 2 * self.lost) * np.abs(away)
-        found = (clear & (nearer > 2 * self.lost * self.extent**2)).any(axis=1)
+        enough = (2 * self.lost * self.extent + 1e-9 * np.abs(away)) * self.extent
+        found = (clear & (nearer > enough)).any(axis=1)
         return np.where(found, self.lost / 2, -np.inf)
 
     def improve(self, rates: Array, which: Indices, least: Array) -> None:
         """Increase the bounds `rates` (n,) of asperities, try by try, until they exceed `least`."""
-        worst = near = np.empty((len(which), 0), dtype=np.intp)
+        worst = np.empty((len(which), 0), dtype=np.intp)
         for count, moments in TRIES:
             if len(which) == 0 or (count > MORE and len(which) > FEW):
                 break
             width = count + worst.shape[1]
-            checked = NEAR * width
-            if near.shape[1] < min(checked, len(self.support) - 1):
-                near = self.neighbours(which, checked)
-            charged = np.column_stack((near[:, :count], worst))
+            seen = self.neighbours(which, NEAR * width)
+            near = np.column_stack((seen[:, :count], worst))
             if moments is None:
-                weights = self.lightest(which, charged)
+                weights = self.lightest(which, near)
             else:
                 make = partial(self.weights, moments)
-                weights = _in_parts(make, (width + 5) ** 2, which, charged)
-            rates[which], failed = self.rates(
-                which, charged, weights, least[which], near[:, :checked]
-            )
+                weights = _in_parts(make, (width + 5) ** 2, which, near)
+            rates[which], failed = self.rates(which, near, weights, seen, least[which])
             todo = ~(rates[which] > least[which])
-            worst = np.column_stack((worst, failed))
-            which, worst, near = which[todo], worst[todo], near[todo]
+            which, worst = which[todo], np.column_stack((worst, failed))[todo]
+
+    def rates(
+        self, which: Indices, near: Indices, weights: Array, seen: Indices, least: Array
+    ) -> tuple[Array, Indices]:
+        """(m,) lower bounds 1 - q_i, and the k that determine q_i; -inf if there are no weights, or
+        where, without (8), near asperities show that the bound is not above `least` (m,).
+        """
+        stretched, every = 1.0 + self.lost, np.arange(len(which))
+        ratios = _in_parts(self._ratios, near.shape[1] * seen.shape[1], which, near, weights, seen)
+        k = ratios.argmin(axis=1)
+        q, worst = 1.0 / np.maximum(ratios[every, k], 1e-300), seen[every, k]
+        gains = self.gains(which, near, weights, seen[:, -1])
+        left = weights.any(axis=1) & (gains == 0) & (1.0 - stretched * q > least)
+        q = np.where(gains > 0, np.maximum(q, 1.0 / (1.0 + gains)), np.inf)
+        q[left], worst[left] = self._everywhere(which[left], near[left], weights[left])
+        return 1.0 - stretched * q, worst
 
     def weights(self, moments: Moments, which: Indices, near: Indices) -> Array:
         """(m, s) weights of least energy of the neighbours `near`; 0 where none are found."""
@@ -236,7 +253,7 @@ class _Swept:
                 break
         off = np.abs((sums @ weights[:, :, None])[:, :, 0] - target[:, s:]).max(axis=1)
         weights[off > 1e-9] = 0.0
-        return weights
+        return np.asarray(weights / np.maximum(weights.sum(axis=1, keepdims=True), 1e-300))
 
     def lightest(self, which: Indices, near: Indices) -> Array:
         """(m, s) weights of the neighbours `near` with the least q_i at a sample of asperities."""
@@ -244,52 +261,24 @@ class _Swept:
 
         weights = np.zeros(near.shape)
         sample = self.support[:: -(-len(self.support) // SAMPLE)]
-        closest = self.neighbours(which, SAMPLE)
-        for k, i in enumerate(which):
-            seen = np.setdiff1d(np.concatenate((near[k], closest[k], sample)), [i])
-            apart = np.abs(self.places[seen] - self.places[i])
-            ratios = self.potentials(near[k][:, None], seen) * apart
+        for k, closest in enumerate(self.neighbours(which, SAMPLE)):
+            i = which[k : k + 1]
+            seen = np.setdiff1d(np.concatenate((near[k], closest, sample)), i)
+            ratios = self.potentials(near[k][:, None], seen) * self.apart(i, seen)
             found = linprog(np.ones(len(near[k])), -ratios.T, -np.ones(len(seen)))
             if found.status == 0 and found.x is not None:
-                weights[k] = np.maximum(found.x, 0.0)  # solvers return some below 0
+                own = np.maximum(found.x, 0.0)  # solvers return some below 0
+                weights[k] = own / own.sum()
         return weights
 
-    def rates(
-        self, which: Indices, near: Indices, weights: Array, least: Array, seen: Indices
-    ) -> tuple[Array, Indices]:
-        """(m,) lower bounds 1 - q_i, and the k that determine q_i; -inf where no weights were found
-        or where, without (8), near asperities show that the bound is not above `least` (m,).
-        """
-        rates, worst = np.full(len(which), -np.inf), near[:, 0].copy()
-        known = np.flatnonzero(weights.any(axis=1))
-        mine, near, stretched = which[known], near[known], 1.0 + self.lost
-        weights = weights[known] / weights[known].sum(axis=1, keepdims=True)
-        q, gains = np.zeros((2, len(known)))
-
-        def check(some: Indices, seen: Indices) -> None:
-            """Set q_i by (7) for the asperities `seen`, and g by (8) for all farther ones."""
-            given = mine[some], near[some], weights[some]
-            ratios = _in_parts(self._ratios, near.shape[1] * seen.shape[1], *given, seen)
-            rows, smallest = np.arange(len(some)), ratios.argmin(axis=1)
-            q[some], worst[known[some]] = 1.0 / ratios[rows, smallest], seen[rows, smallest]
-            gains[some] = self.gains(*given, seen[:, -1])
-
-        def left(wanted: NDArray[np.bool_]) -> Indices:
-            return np.flatnonzero(wanted & (1.0 - stretched * q > least[known]))
-
-        check(np.arange(len(known)), seen[known])
-        some = left(gains == 0)
-        check(some, self.neighbours(mine[some], WIDER * seen.shape[1]))
-        some = left(gains <= 0)
-        q = np.where(gains > 0, np.maximum(q, 1.0 / (1.0 + np.maximum(gains, 0.0))), np.inf)
-        q[some], worst[known[some]] = self._everywhere(mine[some], near[some], weights[some])
-        rates[known] = 1.0 - stretched * q
-        return rates, worst
+    def _ratios(self, which: Indices, near: Indices, weights: Array, seen: Indices) -> Array:
+        """(m, k) sum_j w_j A_jk (with the shell's potential if j = k) over A_ik for k in `seen`."""
+        swept = np.einsum("is,isk->ik", weights, self.potentials(near[:, :, None], seen[:, None]))
+        return np.asarray(swept * self.apart(which[:, None], seen))
 
     def gains(self, which: Indices, near: Indices, weights: Array, last: Indices) -> Array:
         """(m,) g > 0 for which, by (8), q_i = 1 / (1 + g) satisfies (7) for all k at least as far
-        from i as the asperity `last`; else 0 where (8) may prove this from a larger distance on,
-        and -1 elsewhere.
+        from i as the asperity `last`; 0 where (8) proves nothing.
         """
         d = self.places[near] - self.places[which][:, None]
         apart = np.where(weights > 0, np.abs(d), 0.0)
@@ -298,71 +287,27 @@ class _Swept:
         def total(values: NDArray[Any]) -> Array:
             return np.asarray(np.abs((weights * values).sum(axis=1)))
 
-        first, here = (weights * d).sum(axis=1), self.places[which]
-        size, square, rounding = np.abs(first), total(apart**2), self.lost * total(apart)
-
-        m = (first.conj() * here).real - self._least_along(first) + rounding * self.extent
+        square, first = total(apart**2), total(d) + self.lost * total(apart)
         third = 3 / 8 * total(apart**2 * d) + 5 / 8 * total(d**3)
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore"):
             rest = total(apart**4 / np.maximum(r[:, None] - apart, 0.0))
-            s = -(weights * d**2).sum(axis=1) * (first.conj() / size) ** 2
-            beyond = np.maximum(m, 0.0) / size / r
-            across = s.real * (1.0 - 2.0 * beyond**2) - 2.0 * np.abs(s.imag) * beyond
-        edge = (s.real >= 0) & (size * r >= 1.5 * np.abs(s))
-        both = -m - 3 / 4 * total(d**2)
-        both = np.where(edge, np.maximum(both, 3 / 4 * across - np.maximum(m, 0.0)), both)
-        kappa = square / 4 + both - (third + rest) / r
+        kappa = square / 4 - 3 / 4 * total(d**2) - first * self.extent - (third + rest) / r
         # Where kappa > square / 64, kappa / 2 is far larger than its rounding error.
-        farther = np.where(square / 4 + both > square / 16, 0.0, -1.0)
-        return np.where(kappa > square / 64, kappa / 2 / self.extent**2, farther)
-
-    def _ratios(self, which: Indices, near: Indices, weights: Array, seen: Indices) -> Array:
-        """(m, k) sum_j w_j A_jk (with the shell's potential if j = k) over A_ik for k in `seen`."""
-        swept = np.einsum("is,isk->ik", weights, self.potentials(near[:, :, None], seen[:, None]))
-        return np.asarray(swept * np.abs(self.places[seen] - self.places[which][:, None]))
+        return np.where(kappa > square / 64, kappa / 2 / self.extent**2, 0.0)
 
     def _everywhere(self, which: Indices, near: Indices, weights: Array) -> tuple[Array, Indices]:
         """(m,) the least q_i of (7) for the whole support, and the k that determine it."""
         from scipy.sparse import csr_array
 
-        rows = np.arange(len(which))
         charged, columns = np.unique(near, return_inverse=True)
-        starts = np.arange(len(which) + 1) * near.shape[1]
-        shape = len(which), len(charged)
+        starts, shape = np.arange(len(which) + 1) * near.shape[1], (len(which), len(charged))
         charges = csr_array((weights.ravel(), columns.ravel(), starts), shape=shape)
-        nowhere = np.full(len(self.places), np.inf)
+        least, worst = np.full(len(which), np.inf), which.copy()
         parts = 1 + (len(charged) + len(which)) * len(self.support) // NUMBERS
-
-        def among(seen: Indices) -> tuple[Array, Indices]:
-            swept = charges @ (1.0 / self._apart(charged, seen, self.shells))
-            swept *= self._apart(which, seen, nowhere)
-            least = swept.argmin(axis=1)
-            return 1.0 / swept[rows, least], seen[least]
-
-        found = _each(among, np.array_split(self.support, parts))
-        q, worst = map(np.array, zip(*found, strict=True))
-        largest = q.argmax(axis=0)
-        return q[largest, rows], worst[largest, rows]
-
-    def _apart(self, some: Indices, seen: Indices, themselves: Array) -> Array:
-        """(m, k) distances of asperities; from an asperity to itself, its entry in `themselves`."""
-        from scipy.spatial.distance import cdist
-
-        apart: Array = cdist(self.plane[some], self.plane[seen])
-        both, i, j = np.intersect1d(some, seen, return_indices=True)
-        apart[i, j] = themselves[both]
-        return apart
-
-    @cached_property
-    def _least(self) -> Array:
-        """(DIRECTIONS + 1,) the least Re(conj(p) z) on the support, for directions p all around."""
-        sides = np.exp(-2j * np.pi * np.arange(DIRECTIONS + 1) / DIRECTIONS)
-        return np.array([(side * self.places[self.support]).real.min() for side in sides])
-
-    def _least_along(self, directions: NDArray[np.complex128]) -> Array:
-        """(...) for each direction p, a lower bound on Re(conj(p) z) of all z on the support."""
-        step, least = 2 * np.pi / DIRECTIONS, self._least
-        angle = np.angle(directions) % (2 * np.pi) / step
-        k = np.minimum(angle.astype(int), DIRECTIONS - 1)
-        before, after = np.sin(step * np.stack((k + 1 - angle, angle - k)).clip(0.0)) / np.sin(step)
-        return np.asarray(np.abs(directions) * (before * least[k] + after * least[k + 1]))
+        for seen in np.array_split(self.support, parts) if len(which) else ():
+            ratios = charges @ self.potentials(charged[:, None], seen)
+            ratios *= self.apart(which[:, None], seen)
+            k = ratios.argmin(axis=1)
+            worst = np.where(ratios.min(axis=1) < least, seen[k], worst)
+            least = np.minimum(least, ratios.min(axis=1))
+        return 1.0 / least, worst
