@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
 from convexrough.arithmetic.balls import of_rows
-from convexrough.arrays import Array, Indices, frozen
+from convexrough.arrays import Array, Indices, among_zeros, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.friction.curve import MemoryCurve
@@ -320,11 +320,14 @@ def _loop(cycle: Cycle, way: Sequence[Fraction], chosen: Indices) -> Loop:
     path = [(levels.load, height) for height in (*past, *heights)]
     checks.fits_in_memory("points", len(path), 200 * len(cycle.scene), noun="levels")
     walk, loop = Walk(levels, cycle._walk.start, path, steps=1), slice(len(past), None)
+    places = levels.top.problem.places[chosen]
+    on = np.flatnonzero(places >= 0)  # the others cannot touch
     if general is None:
-        states = states_of(levels, walk.curves[loop], chosen)
+        states = states_of(levels, walk.curves[loop], places[on])
     else:
-        states = States(*(each[loop] for each in walk.states(chosen)))
-    loaded = levels.loads[chosen] > 0
-    forces, displacements = states.forces.value, states.asperity_displacements.value
-    own = (frozen(np.where(loaded, it, 0.0)) for it in (forces, displacements))
+        states = States(*(each[loop] for each in walk.states(places[on])))
+    loaded, own = levels.loads[chosen] > 0, list[Array]()
+    for each in (states.forces, states.asperity_displacements):
+        values = among_zeros(each.value, on, len(chosen), axis=-1)
+        own.append(frozen(np.where(loaded, values, 0.0)))
     return Loop(chosen, walk.forces[loop], frozen(states.displacements.value), *own)

@@ -92,7 +92,7 @@ def fretting(cycle: Cycle) -> Fretting:
     modulus = scene.material.contact_modulus
     unknown = np.nan if walk.general is not None else 0.0  # the memory curve does not hold
     # Gaps are half the range of the slip of asperities that slide.
-    gaps = -levels.to_scene(levels.depths(walk.stuck[0], levels.candidates))
+    gaps = -levels.to_scene(levels.depths(walk.stuck[0]))
     travel = f * float(mindlin.ratio(scene.material.poisson_ratio))
     gross = np.where(cycle.slips > 0, travel * np.maximum(gaps, 0.0), cycle.slips) + unknown
     a = stick_radii(levels, levels.at(walk.least))[0]
@@ -101,7 +101,7 @@ def fretting(cycle: Cycle) -> Fretting:
     in_part = rim * rim_gap(np.minimum(stuck, 1.0))
     mean = largest = np.full(len(scene), unknown)
     known = cache(lambda load: stick_radii(levels, levels.at(load))[0])
-    every = levels.to_scene(states_of(levels, walk.steady, levels.candidates).forces.value)
+    every = levels.to_scene(states_of(levels, walk.steady).forces.value)
     for k, (curve, forces) in enumerate(zip(walk.steady, every, strict=True), 1):
         LOGGER.info(f"tractions at point {k:,} of {len(every):,}")
         bends = [(load, float(bend)) for load, bend in curve.bends if bend and load]

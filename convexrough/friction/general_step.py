@@ -177,12 +177,12 @@ class Stepper:
     """Solver of general steps, for scenes whose compliance matrix fits in memory."""
 
     def __init__(self, levels: FrictionLevels) -> None:
-        scene = levels.scene
-        checks.fits_in_memory("asperities", len(scene), 24.0, 2)
+        scene, which = levels.scene, levels.candidates
+        checks.fits_in_memory("asperities", len(which), 24.0, 2)
         modulus = scene.material.contact_modulus
         self.levels = levels
-        self.coefficients = hertz.local_coefficient(modulus, scene.relative_radii)
-        self.influence = couple(scene, np.arange(len(scene)), 1.0 / (np.pi * modulus), "dense")
+        self.coefficients = hertz.local_coefficient(modulus, scene.relative_radii[which])
+        self.influence = couple(scene, which, 1.0 / (np.pi * modulus), "dense")
         self.A = self.influence.matrix
 
     def start(self, load: Fraction) -> Bundle:
@@ -299,7 +299,7 @@ class SteppedPath(NamedTuple):
     states: States
     losses: Array  # (m,) [force length] energy lost since the start; nan if it does not settle
     status: NDArray[np.str_]  # (m, N) "open" or "undecided"
-    fronts: Array  # (m, N) as in `OwnStep`, for each asperity
+    fronts: Array  # (m, n) as in `OwnStep`, for each candidate
 
 
 def followed(

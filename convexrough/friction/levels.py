@@ -19,14 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough import checks
-from convexrough.arithmetic.balls import TINY, Ball, of_rows
+from convexrough.arithmetic.balls import TINY, Ball
 from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair
-from convexrough.arrays import Array, Indices, among_zeros, frozen
+from convexrough.arrays import Array, among_zeros, frozen
 from convexrough.contact import Contact, levels_of
 from convexrough.errors import InputError, ProofError
 from convexrough.friction.order import MOST, Order, order_between
 from convexrough.normal.level import Level, Rows, rows_of
-from convexrough.roundoff import AT_THE_END, ROUNDOFF, SAFETY
+from convexrough.roundoff import AT_THE_END, ROUNDOFF
 from convexrough.scene.scene import Scene
 
 
@@ -136,25 +136,9 @@ class FrictionLevels:
             self._ordered = min(asked)
         return found
 
-    def depths(self, load: Fraction, which: Indices | slice = slice(None)) -> Array:
-        """[length] indentations at a load, minus the gap where open; as in `indentations`."""
-        return self.indentations(self.at(load), which).value * self.units.length
-
-    def indentations(self, level: Level, which: Indices | slice = slice(None)) -> Ball:
-        """The indentations n_i of a level for the asperities `which`, by default all. Those of
-        asperities that cannot touch are in float64, and take most of the time.
-        """
-        known: Ball = of_rows(self.to_scene, level.indentation)
-        problem, state = self._levels.problem, level.trial
-        if (problem.places[which] >= 0).all():
-            return known[which]
-        loads = np.zeros(len(problem)) if state is None else state.loads.high
-        n, off = problem.beyond(loads, float(level.approach.value))
-        if len(n):
-            moved = 0.0 if state is None else level.moves(problem.onto_screened)
-            off += float(level.approach.error) + moved
-            known.mid.high[problem.screened], known.radius[problem.screened] = n, off
-        return Ball(known.mid, known.radius * (1 + SAFETY))[which]
+    def depths(self, load: Fraction) -> Array:
+        """(n,) [length] indentations of the candidates at a load, minus the gap where open."""
+        return self.at(load).indentation.value * self.units.length
 
     def to_scene(self, values: NDArray[Any]) -> NDArray[Any]:
         """(..., N) the values (..., n) of the candidates, with 0 for all other asperities."""

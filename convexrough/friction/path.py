@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks
+from convexrough.arithmetic.balls import of_rows
 from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact, press
 from convexrough.errors import InputError
@@ -49,7 +50,7 @@ class LoadPath(Table, Plottable):
     losses         : (m,) [force length] energy lost by both bodies since the start
     asperity_forces, asperity_loads : (m, n) [force] shear force Q_i and load P_i of each asperity
     drifts         : (m, n) [length] tangential displacement of each asperity relative to the
-        opposite surface, also while it is open
+        opposite surface, also while it is open; 0 for asperities that cannot touch along the path
     asperity_displacements : (m, n) [length] drift plus the displacement that the own force causes
     displacement_errors, loss_errors, asperity_force_errors : proved bounds on the errors; infinite
         where nothing is proved
@@ -250,8 +251,10 @@ def path_of(contact: Contact, walk: Walk) -> LoadPath:
     """The result for a path whose highest load is that of the contact."""
     levels, points = walk.levels, [load for load, _ in walk.points]
     levels.prepare([*walk.needed, *points])
-    (losses, loss_errors), found = walk.losses(), [rounded(each) for each in walk.states()]
-    (displacements, displacement_errors), (asperity_forces, force_errors), own, drifts = found
+    (losses, loss_errors), (moved, *each) = walk.losses(), walk.states()
+    displacements, displacement_errors = rounded(moved)
+    found = (rounded(of_rows(levels.to_scene, it)) for it in each)
+    (asperity_forces, force_errors), own, drifts = found
     rows = levels.rows(points)
     fronts = [np.nan if curve.front is None else float(curve.front) for curve in walk.curves]
     return LoadPath(

@@ -208,10 +208,10 @@ def shear(
             height = _by_steps(levels, abs(displacement))
         height = height if displacement >= 0 else -height
     walk = Walk(levels, start, [(P, height)])
-    order, (moved, *each) = walk.order, (it[0] for it in walk.states(levels.candidates))
+    order, (moved, *each) = walk.order, (it[0] for it in walk.states())
     carried, asperities, drifts = (of_rows(levels.to_scene, it) for it in each)
     if walk.general is not None:
-        squared = contact.scene.relative_radii * walk.general.fronts[0]
+        squared = contact.scene.relative_radii * levels.to_scene(walk.general.fronts[0])
         radii, radius_errors = np.where(loaded, np.sqrt(squared), 0.0), np.zeros(len(loaded))
         total = Ball.exact(height) * levels.coefficient
     else:

@@ -36,12 +36,12 @@ Loads: TypeAlias = tuple[Fraction, Fraction]
 
 
 class States(NamedTuple):
-    """m states of N asperities in the scene's units, with errors; infinite without a proof."""
+    """m states of n asperities in the scene's units, with errors; infinite without a proof."""
 
     displacements: Ball  # (m,) X, tangential displacement of one body relative to the other
-    forces: Ball  # (m, N) Q_i, shear forces of the asperities
-    asperity_displacements: Ball  # (m, N) own deflection plus drift
-    drifts: Ball  # (m, N) displacements of asperities, open ones too, along the opposite surface
+    forces: Ball  # (m, n) Q_i, shear forces of the asperities
+    asperity_displacements: Ball  # (m, n) own deflection plus drift
+    drifts: Ball  # (m, n) displacements of asperities, open ones too, along the opposite surface
 
 
 class LevelSums(NamedTuple):
@@ -82,12 +82,12 @@ def displacements_of(levels: FrictionLevels, sums: LevelSums) -> Ball:
 def states_of(
     levels: FrictionLevels, curves: Sequence[MemoryCurve], which: Indices | slice = slice(None)
 ) -> States:
-    """The states of these curves, for the asperities `which` in this order; default all."""
+    """The states of these curves, for the candidates `which` in this order; default all."""
     sums = LevelSums.of(curves)
     levels.prepare(sums.used)
     solved, travel = [levels.at(load) for load in sums.used], levels.travel_unit
-    loads = Ball.stacked([of_rows(levels.to_scene, level.loads)[which] for level in solved])
-    moved = Ball.stacked([levels.indentations(level, which) for level in solved])
+    loads = Ball.stacked([level.loads[which] for level in solved])
+    moved = Ball.stacked([level.indentation[which] for level in solved])
     return States(
         displacements_of(levels, sums),
         sums.total(loads) * levels.force_unit,

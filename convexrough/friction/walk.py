@@ -97,7 +97,7 @@ class Walk:
         return followed(self.levels, self.start, self.points, self.steps, self.stepper)
 
     def states(self, which: Indices | slice = slice(None)) -> States:
-        """The states at the m points, for the asperities `which`, by default all."""
+        """The states at the m points, for the candidates `which`, by default all."""
         if self.general is not None:
             moved, *each = self.general.states
             return States(moved, *(values[:, which] for values in each))

@@ -231,7 +231,7 @@ def _exact(contact: Contact, t0: Fraction, p: Any, t: Any) -> dict[str, Any]:
     order = _order(contact, worst, highest)
     proved = order == "proved" and bool((top.touching | top.open).all())
     proved = proved and bool(levels.to_scene(sure.touching)[touching].all())
-    gaps = np.maximum(-levels.depths(worst.lower), 0.0) * (contact.loads > 0)
+    gaps = np.maximum(-levels.to_scene(levels.depths(worst.lower)), 0.0) * (contact.loads > 0)
     # The point (L*, T*) at the lower bound, or at the factor 0 if there is no limit.
     part = Fraction(lower * (1 - SAFETY)) if lower < np.inf else Fraction(0)
     at_last = worst.upper if lower < float(gross) else min(P0, P0 - part * fall)
