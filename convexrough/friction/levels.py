@@ -111,8 +111,12 @@ class FrictionLevels:
         The approach at this load is D0(P) - X / (c_t f). Raises InputError beyond the X at which
         gross sliding starts.
         """
-        room = self.top.approach - self.at(Fraction(0)).approach
-        if is_gross(displacement, room * self.travel_unit):
+        farthest = (self.top.approach - self.at(Fraction(0)).approach) * self.travel_unit
+        if not displacement <= (most := float(farthest.value)) * (1 + 1e-14):
+            given, start = (repr(float(x)).removesuffix(".0") for x in (displacement, most))
+            expected = f"at most X = {start}, at which it starts"
+            raise InputError("displacement", found=f"{given}: gross sliding", expected=expected)
+        if not (farthest - displacement).value > AT_THE_END * ROUNDOFF * displacement:
             return Fraction(0)
         lowered = Ball.exact(displacement) / self.travel_unit
         if displacement == 0.0:
@@ -149,19 +153,6 @@ class FrictionLevels:
         if self._prescribed is not None:
             return exactly(loads).scaled(1.0 / self.units.force)
         return self.top.load - exactly([self.load - x for x in loads]).scaled(1 / self.units.force)
-
-
-def is_gross(displacement: float, farthest: Ball) -> bool:
-    """True if X = `displacement` is `farthest`, where gross sliding starts, up to rounding.
-
-    Raises InputError for larger X.
-    """
-    if not displacement <= (most := float(farthest.value)) * (1 + 1e-14):
-        given, start = (repr(float(x)).removesuffix(".0") for x in (displacement, most))
-        expected = f"at most X = {start}, at which it starts"
-        raise InputError("displacement", found=f"{given}: gross sliding", expected=expected)
-    left = (farthest - Ball.exact(displacement)).value
-    return not left > AT_THE_END * ROUNDOFF * displacement
 
 
 def height_at(load: Fraction, force: float | Fraction, scene: Scene) -> Fraction:

@@ -15,8 +15,7 @@ from convexrough.arrays import Array, frozen
 from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.friction.curve import MemoryCurve
-from convexrough.friction.general_step import followed
-from convexrough.friction.levels import FrictionLevels, is_gross
+from convexrough.friction.levels import FrictionLevels
 from convexrough.friction.order import Order
 from convexrough.friction.state import stick_radii
 from convexrough.friction.walk import Walk
@@ -24,7 +23,6 @@ from convexrough.normal.boxes import Scope
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
 from convexrough.record import Along, Proved, Table
-from convexrough.roundoff import ROUNDOFF
 
 if TYPE_CHECKING:
     from convexrough.gradients.change import Direction, ShearChange
@@ -48,7 +46,7 @@ class ShearCertificate(Proved):
     slip_errors, stick_radius_errors : [length] bounds on the errors of slips and stick radii
     force_error : [force] bound on the error of the shear force; 0 if it is prescribed and below f P
     displacement_error : [length] bound on the error of the displacement; 0 if it is prescribed,
-        unless the contact slides as a whole or `order` is "fails" (then infinite)
+        unless the contact slides as a whole; infinite if `order` is "fails"
 
     >>> judged = cr.shear(contact, force=0.25 * contact.load).certificate
     >>> judged.scope, judged.all_proved, (judged.status == "sliding").sum().item()
@@ -173,7 +171,8 @@ def shear(
     `order` is "fails" and the normal solution is proved, it comes from general steps.
 
     force [force] or displacement [length] : the prescribed one of shear force Q and relative
-        tangential displacement of distant points
+        tangential displacement of distant points. If `order` is "fails", a displacement gives the
+        force of the memory curve, and the result's displacement is that under this force
 
     If |Q| or the displacement differs from its value at the onset of gross sliding (f P for |Q|) by
     at most 16 * 2^-53 of this value, it counts as that value, also in the result. So does a
@@ -204,8 +203,6 @@ def shear(
     else:
         displacement = checks.finite("displacement", displacement)
         height = P - levels.displaced(abs(displacement))
-        if levels.proved and Walk(levels, start, [(P, height)]).order == "fails":
-            height = _by_steps(levels, abs(displacement))
         height = height if displacement >= 0 else -height
     walk = Walk(levels, start, [(P, height)])
     order, (moved, *each) = walk.order, (it[0] for it in walk.states())
@@ -219,7 +216,8 @@ def shear(
         radii, radius_errors = stick_radii(levels, level)
         total = (levels.top.load - level.load) * levels.force_unit
         total = total if height >= 0 else -total
-    if abs(height) == P:  # the given value may differ from gross sliding by rounding
+    # The given value may differ from gross sliding by rounding; general steps miss a displacement.
+    if abs(height) == P or (force is None and walk.general is not None):
         force = displacement = None
     unsure = ~levels.to_scene(levels.top.touching) & levels.to_scene(~levels.top.open)
     most = np.abs(drifts.value) + drifts.error  # the slip is 0 if the asperity does not touch
@@ -247,21 +245,3 @@ def shear(
         certificate=certificate,
         height=height,
     )
-
-
-def _by_steps(levels: FrictionLevels, displacement: float) -> Fraction:
-    """The value of T = Q / f for which general steps from rest give this displacement X >= 0.
-
-    Raises InputError beyond the X at which gross sliding starts.
-    """
-    from scipy.optimize import brentq  # 0.1 s to import: only when asked
-
-    def moved(part: float) -> float:
-        points = [(levels.load, Fraction(part) * levels.load)]
-        states = followed(levels, MemoryCurve.pressed(levels.load), points).states
-        return float(states.displacements.value[0])
-
-    if is_gross(displacement, Ball.exact(moved(1.0))):
-        return levels.load
-    root = brentq(lambda part: moved(part) - displacement, 0.0, 1.0, xtol=1e-12)
-    return Fraction(min(root, 1.0 - ROUNDOFF)) * levels.load  # below gross sliding
