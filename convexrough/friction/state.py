@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 
 from convexrough import threads
 from convexrough.arithmetic.balls import Ball, joined, of_rows, where
-from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.friction.curve import MemoryCurve, Piece
 from convexrough.friction.levels import FrictionLevels, exactly, rounded
@@ -49,27 +48,24 @@ class LevelSums(NamedTuple):
 
     used: list[Fraction]  # the k total loads of the levels of all curves, sorted
     places: Indices  # (m, j) the levels of each curve, as indices into `used`
-    weights: Ball  # (m, j) slope below minus slope above; rows of curves with fewer levels: 0
+    weights: list[Ball]  # j times (m,): slope below minus slope above; 0 beyond a curve's levels
 
     @classmethod
     def of(cls, curves: Sequence[MemoryCurve]) -> LevelSums:
         bends = [[(load, bend) for load, bend in curve.bends if bend] for curve in curves]
         used = sorted({load for each in bends for load, _ in each} or {curves[0].load})
-        place = {load: k for k, load in enumerate(used)}
-        places = np.zeros((len(bends), max((len(each) for each in bends), default=0)), np.intp)
-        high, low = np.zeros(places.shape), np.zeros(places.shape)
-        for row, each in enumerate(bends):
-            for column, (load, bend) in enumerate(each):
-                places[row, column] = place[load]
-                high[row, column], low[row, column] = Pair.nearest(bend)
-        return cls(used, places, Ball.around(Pair(high, low), 2.0**-98 * np.abs(high)))
+        place, wide = {load: k for k, load in enumerate(used)}, max(map(len, bends), default=0)
+        padded = [[*each, *[(used[0], Fraction(0))] * (wide - len(each))] for each in bends]
+        places = np.array([[place[load] for load, _ in each] for each in padded], dtype=np.intp)
+        columns = [exactly([each[k][1] for each in padded]) for k in range(wide)]
+        return cls(used, places, columns)
 
     def total(self, values: Ball) -> Ball:
         """(m, ...) for each curve the weighted sum of values (k, ...) at the levels `used`."""
         wide = (slice(None),) + (None,) * (len(values.shape) - 1)
         total = Ball.exact(np.zeros((len(self.places), *values.shape[1:])))
-        for j in range(self.places.shape[1]):
-            total = total + self.weights[:, j][wide] * values[self.places[:, j]]
+        for weight, places in zip(self.weights, self.places.T, strict=True):
+            total = total + weight[wide] * values[places]
         return total
 
 

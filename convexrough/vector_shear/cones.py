@@ -104,15 +104,19 @@ class FrictionConic:
         >>> cr.FrictionConic().solve(problem, np.array([0.1, 0.0])).increments.shape
         (37, 2)
         """
-        scale = min(float(np.hypot(*total)) / (ELASTIC * problem.loads.sum()), 1.0)
-        program = FrictionProgram.assemble(problem, total / scale)
-        data, solver = program.apply(), f"friction ({self.name})"
+        solver, size = f"friction ({self.name})", float(np.hypot(*total))
+        if problem.share > FIVE_CONES_LIMIT:
+            raise _too_dense(problem)
+        scale = min(size / (ELASTIC * problem.loads.sum()), 1.0)
+        elastic = (size / scale) * problem.elastic.value / problem.loads
+        small = np.clip(elastic, 0.01 * elastic.max(), 1.0)
+        data, energy = _program(problem, total / scale, small)
         for step in STEPS:
             raw = run_clarabel(data, solver, self.tolerance, max_step_fraction=step)
-            state = program.invert(raw)
-            energy = problem.energy(state.increments, problem.couple(state.increments))
+            state = _state(problem, total / scale, small, energy, raw)
+            least = problem.energy(state.increments, problem.couple(state.increments))
             known = certify_vectors(problem, state, Ball.exact(total / scale))
-            gap, residual = known.excess / energy, problem.residual(state)
+            gap, residual = known.excess / least, problem.residual(state)
             if gap <= self.accepted and residual <= SLIPS * self.accepted:
                 q, X, slips = (scale * each for each in state[1:4])
                 return VectorState(total, q, X, slips, state.iterations)
@@ -126,106 +130,83 @@ class FrictionConic:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class FrictionProgram:
-    """The cone program, scaled so that its numbers are about 1.
+def _too_dense(problem: FrictionProblem) -> SolverError:
+    touching, numbers = problem.touching, problem.convexity_numbers
+    named = (f"{touching[i]} ({numbers[i]:.4g})" for i in np.argsort(-numbers)[:5])
+    return SolverError(
+        "asperities too dense for a convex program, which needs S <= 1: the kernel is "
+        f"convex from a shift S that is {problem.share:.4g} of the local compliance. "
+        "Largest convexity numbers (contact radii divided by pi/4 times the distance to "
+        f"the nearest neighbour), by asperity: {', '.join(named)}",
+        solver="friction (conic)",
+        advice="use a smaller load, sharper tips, or asperities further apart",
+    )
+
+
+def _program(problem: FrictionProblem, total: Array, small: Array) -> tuple[ConeProgram, float]:
+    """The cone program for a total (2,), with numbers of about 1, and its unit of energy.
 
     The variables are q / (epsilon P), in the order x_1, y_1, x_2, ..., then those of the cones,
-    asperity by asperity.
+    asperity by asperity; those of order k in u are divided by epsilon^k. Of the rows of the cones,
+    the first three of each asperity are m / P >= |q| / P, divided by epsilon.
 
-    total : (2,) the total shear force T;  lift : the cones of an asperity;  small : (n,) epsilon
-    energy, force : the units of energy and of the total
+    small : (n,) epsilon
     """
+    from scipy import sparse  # 0.1 s to import: only when solving
 
-    problem: FrictionProblem
-    total: Array
-    lift: _Lift
-    small: Array
-    energy: float
-    force: float
+    n, P, force = len(problem), problem.loads, float(np.hypot(*total))
+    energy = float((P * problem.thresholds * small**2).max())
+    lift, e = FOUR if problem.share <= FOUR_CONES_LIMIT else FIVE, small[:, None]
+    unit, more = np.repeat(small * P, 2), (len(lift.orders) - 1) * n
+    M = problem.kernel.copy()
+    M[np.diag_indices(2 * n)] += np.repeat(problem.share * problem.compliance, 2)
+    upper = sparse.csc_array(np.triu(M * (unit / energy) * unit[:, None]))
+    counted = (P * problem.thresholds / energy)[:, None] * e**lift.orders
+    lifted = (counted * (lift.energy[0] + problem.share * lift.energy[1]))[:, 1:]
 
-    @classmethod
-    def assemble(cls, problem: FrictionProblem, total: Array) -> FrictionProgram:
-        """The program for a total (2,). Raises SolverError if S exceeds the range of the cones."""
-        if problem.share > FIVE_CONES_LIMIT:
-            touching, numbers = problem.touching, problem.convexity_numbers
-            worst = np.argsort(-numbers)[:5]
-            named = ", ".join(f"{touching[i]} ({numbers[i]:.4g})" for i in worst)
-            raise SolverError(
-                "asperities too dense for a convex program, which needs S <= 1: the kernel is "
-                f"convex from a shift S that is {problem.share:.4g} of the local compliance. "
-                "Largest convexity numbers (contact radii divided by pi/4 times the distance to "
-                f"the nearest neighbour), by asperity: {named}",
-                solver="friction (conic)",
-                advice="use a smaller load, sharper tips, or asperities further apart",
-            )
-        elastic = np.hypot(*total) * problem.elastic.value / problem.loads
-        small = np.clip(elastic, 0.01 * elastic.max(), 1.0)
-        energy = float((problem.loads * problem.thresholds * small**2).max())
-        lift = FOUR if problem.share <= FOUR_CONES_LIMIT else FIVE
-        return cls(problem, total, lift, small, energy, float(np.hypot(*total)))
+    leading = np.where(lift.cones != 0, lift.orders, np.inf).min(axis=2, keepdims=True)
+    forms = lift.cones * e[:, :, None, None] ** np.maximum(lift.orders - leading, 0.0)
+    rows = (SECOND_ORDER @ forms).reshape(n, -1, len(lift.orders))
+    friction = np.zeros((n, 3, len(lift.orders)))
+    friction[:, 0] = lift.share * e ** (lift.orders - 1)
+    rows = np.concatenate((friction, rows), axis=1)
 
-    def apply(self) -> ConeProgram:
-        """The program in standard form: the objective, the prescribed total and all cones."""
-        from scipy import sparse  # 0.1 s to import: only when solving
+    vectors = np.zeros((rows.shape[1], 2))
+    vectors[[1, 2], [0, 1]] = 1.0
+    balance = sparse.kron((small * P)[None] / force, sparse.eye_array(2))
+    blocks = (np.ascontiguousarray(rows[:, :, 1:]), np.arange(n), np.arange(n + 1))
+    forces = sparse.csc_array(sparse.kron(sparse.eye_array(n), vectors))
+    cones = sparse.hstack([forces, sparse.csc_array(sparse.bsr_array(blocks))])
+    totals = sparse.hstack([balance, sparse.csc_array((2, more))])
+    constraints = sparse.csc_array(sparse.vstack([totals, -cones]))
+    constraints.eliminate_zeros()
+    program = ConeProgram(
+        quadratic=sparse.csc_array(sparse.block_diag((upper, sparse.csc_array((more, more))))),
+        linear=np.concatenate((np.zeros(2 * n), lifted.ravel())),
+        constraints=constraints,
+        constant=np.concatenate((total / force, rows[:, :, 0].ravel())),
+        equalities=2,
+    )
+    return program, energy
 
-        problem, lift, small = self.problem, self.lift, self.small[:, None]
-        n, P = len(problem), problem.loads
-        unit, more = np.repeat(self.small * P, 2), (len(lift.orders) - 1) * n
-        M = problem.kernel.copy()
-        M[np.diag_indices(2 * n)] += np.repeat(problem.share * problem.compliance, 2)
-        upper = sparse.csc_array(np.triu(M * (unit / self.energy) * unit[:, None]))
-        counted = (P * problem.thresholds / self.energy)[:, None] * small**lift.orders
-        lifted = (counted * (lift.energy[0] + problem.share * lift.energy[1]))[:, 1:]
 
-        rows = self._rows()
-        vectors = np.zeros((rows.shape[1], 2))
-        vectors[[1, 2], [0, 1]] = 1.0
-        balance = sparse.kron((self.small * P)[None] / self.force, sparse.eye_array(2))
-        blocks = (np.ascontiguousarray(rows[:, :, 1:]), np.arange(n), np.arange(n + 1))
-        forces = sparse.csc_array(sparse.kron(sparse.eye_array(n), vectors))
-        cones = sparse.hstack([forces, sparse.csc_array(sparse.bsr_array(blocks))])
-        totals = sparse.hstack([balance, sparse.csc_array((2, more))])
-        constraints = sparse.csc_array(sparse.vstack([totals, -cones]))
-        constraints.eliminate_zeros()
-        quadratic = sparse.block_diag((upper, sparse.csc_array((more, more))))
-        return ConeProgram(
-            quadratic=sparse.csc_array(quadratic),
-            linear=np.concatenate((np.zeros(2 * n), lifted.ravel())),
-            constraints=constraints,
-            constant=np.concatenate((self.total / self.force, rows[:, :, 0].ravel())),
-            equalities=2,
-        )
+def _state(
+    problem: FrictionProblem, total: Array, small: Array, energy: float, raw: RawAnswer
+) -> VectorState:
+    """Forces, rigid displacement and slips, from the solver's variables and multipliers.
 
-    def _rows(self) -> Array:
-        """(n, rows, k) the rows of all cones, for variables divided by epsilon^order.
-
-        The first three rows of each asperity are m / P >= |q| / P, divided by epsilon.
-        """
-        lift, small = self.lift, self.small[:, None]
-        leading = np.where(lift.cones != 0, lift.orders, np.inf).min(axis=2, keepdims=True)
-        forms = lift.cones * small[:, :, None, None] ** np.maximum(lift.orders - leading, 0.0)
-        rows = (SECOND_ORDER @ forms).reshape(len(small), -1, len(lift.orders))
-        friction = np.zeros((len(small), 3, len(lift.orders)))
-        friction[:, 0] = lift.share * small ** (lift.orders - 1)
-        return np.concatenate((friction, rows), axis=1)
-
-    def invert(self, raw: RawAnswer) -> VectorState:
-        """Forces, rigid displacement and slips, from the solver's variables and multipliers.
-
-        An interior-point method returns |q_i| < P_i and a slip > 0 everywhere. An asperity slides
-        if the slip exceeds the threshold minus the deflection.
-        """
-        problem = self.problem
-        n, P, thresholds = len(problem), problem.loads, problem.thresholds
-        unit = self.small * P
-        q = raw.x[: 2 * n].reshape(n, 2) * unit[:, None]
-        size = np.hypot(*q.T)
-        displacement = -raw.multipliers[:2] * self.energy / self.force
-        limit = raw.multipliers[2:].reshape(n, -1)[:, 0] * self.energy / unit  # of |q_i| <= m_i
-        slip = limit - (thresholds - problem.share * problem.compliance * P)  # where |q_i| = P_i
-        left = thresholds - problem.deflections(np.minimum(size, P))
-        sliding = slip > left
-        q = along(np.where(sliding, P, np.minimum(size, P)), q, size)
-        slips = along(np.where(sliding, slip, 0.0), q, np.hypot(*q.T))
-        return VectorState(self.total, q, displacement, slips, raw.iterations)
+    An interior-point method returns |q_i| < P_i and a slip > 0 everywhere. An asperity slides if
+    the slip exceeds the threshold minus the deflection.
+    """
+    n, P, thresholds = len(problem), problem.loads, problem.thresholds
+    unit = small * P
+    q = raw.x[: 2 * n].reshape(n, 2) * unit[:, None]
+    size = np.hypot(*q.T)
+    displacement = -raw.multipliers[:2] * energy / float(np.hypot(*total))
+    limit = raw.multipliers[2:].reshape(n, -1)[:, 0] * energy / unit  # of |q_i| <= m_i
+    slip = limit - (thresholds - problem.share * problem.compliance * P)  # where |q_i| = P_i
+    left = thresholds - problem.deflections(np.minimum(size, P))
+    sliding = slip > left
+    q = along(np.where(sliding, P, np.minimum(size, P)), q, size)
+    slips = along(np.where(sliding, slip, 0.0), q, np.hypot(*q.T))
+    return VectorState(total, q, displacement, slips, raw.iterations)
