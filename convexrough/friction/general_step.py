@@ -37,8 +37,8 @@ from convexrough.sphere import hertz
 #: the largest of the RECENT latest ones; slopes jump where an asperity begins or ceases to slide.
 ACCURATE, RECENT = 1e-14, 10
 
-#: Largest numbers of Newton steps, of halvings of a Newton step, and of halvings of a general step.
-ITERATIONS, HALVINGS, CUTS = 60, 30, 6
+#: Largest numbers of Newton steps, and of halvings of a Newton step.
+ITERATIONS, HALVINGS = 60, 30
 
 #: The numbers of steps per segment that are tried, until each loss changes by at most SETTLED times
 #: the sum of this loss and NEGLIGIBLE times the largest loss, and each displacement by at most
@@ -207,20 +207,14 @@ class Stepper:
             found.append(now)
         return found
 
-    def step(self, now: Bundle, load: Fraction, height: Fraction, cuts: int = CUTS) -> Bundle:
-        """The state after one step, which is cut in two if Newton's method does not converge."""
+    def step(self, now: Bundle, load: Fraction, height: Fraction) -> Bundle:
+        """The state after one step."""
         if not load:
             lost = float(now.height) / 2 * now.displacement
             return self.start(load)._replace(work=now.work - lost)
         step = Step.to(now, self.levels.depths(load), float(height))
         gross = load - abs(height) <= AT_THE_END * Fraction(ROUNDOFF) * load
-        try:
-            eta, x, own = self._gross(step) if gross else self._solve(step)
-        except SolverError:
-            if cuts == 0:
-                raise
-            middle = (now.load + load) / 2, (now.height + height) / 2
-            return self.step(self.step(now, *middle, cuts - 1), load, height, cuts - 1)
+        eta, x, own = self._gross(step) if gross else self._solve(step)
         moved, displacement = now.positions + eta, now.displacement + x
         work = now.work + float(now.height + height) / 2 * x
         known = step.indentations, own.curves(), own.fronts, own.forces

@@ -127,28 +127,6 @@ def test_the_octagon() -> None:
     assert octagon("rough").loss == pytest.approx(1.9572569969746e-13, rel=1e-12, abs=0.0)
 
 
-CONSTANT = [("paper", 0.7, -0.3), ("rough", 0.7, -0.3)]
-CONSTANT += [("paper", high, -high) for high in (1e-6, 1e-5, 1e-4)]
-
-
-@pytest.mark.parametrize(("name", "high", "low"), CONSTANT)
-def test_constant_load_is_a_cycle(name: str, high: float, low: float) -> None:
-    scene, P, Q = path_of(name, [(1, high), (1, low)])
-    contact = cr.press(scene, load=P[0])
-    cycle = cr.cycle(contact, maximum=Q[0], minimum=Q[1])
-    found = cr.steady(scene, loads=P, forces=Q)
-    assert found.loss == pytest.approx(cycle.loss, rel=1e-11 if high > 1e-4 else 1e-8, abs=0.0)
-    assert found.loss_error <= 1e-8 * cycle.loss
-    assert_allclose(
-        found.asperity_losses, cycle.asperity_losses, rtol=1e-8, atol=1e-12 * cycle.loss
-    )
-    assert (found.status == cycle.status).all()
-    first = cr.shear(contact, force=0.5 * (Q[0] - Q[1]))
-    assert_allclose(found.slips, 2 * first.slips, atol=1e-12 * first.displacement)
-    sticking = found.status == "partial"
-    assert_allclose(found.stick_radii[sticking], first.stick_radii[sticking], rtol=1e-9)
-
-
 @settings(max_examples=5, deadline=None)
 @given(random_scenes(crowding=0.7, most=12), st.integers(0, 2**32 - 1))
 def test_every_later_cycle_is_the_same(sampled: tuple[cr.Scene, float], seed: int) -> None:
