@@ -22,3 +22,9 @@ class Plottable:
         from convexrough.plots import plot  # it imports matplotlib
 
         return plot(self, axes)
+
+    def _picture(self) -> str:
+        """A small map of the result as an HTML image."""
+        from convexrough.plots import thumbnail
+
+        return thumbnail(self)

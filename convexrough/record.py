@@ -51,7 +51,10 @@ class Record:
             f"<td style='text-align:left'>{escape(it)}</td></tr>"
             for name, it in self._rows()
         )
-        return f"<table><caption>{type(self).__name__}</caption>{rows}</table>"
+        table = f"<table><caption>{type(self).__name__}</caption>{rows}</table>"
+        picture = self._picture() if hasattr(self, "_picture") else ""  # of `Plottable`
+        style = "display:flex;flex-wrap:wrap;align-items:start;gap:1em"
+        return f"<div style='{style}'>{table}{picture}</div>"
 
     def __getstate__(self) -> dict[str, Any]:
         """The fields by name, without results that are cached on the object."""

@@ -5,6 +5,7 @@ from .cycle import fretting_figures as fretting_figures
 from .gradient import gradient_figures as gradient_figures
 from .notebook import plot as plot
 from .notebook import save as save
+from .notebook import thumbnail as thumbnail
 from .path import path_figures as path_figures
 from .press import press_figures as press_figures
 from .shakedown import shakedown_figures as shakedown_figures

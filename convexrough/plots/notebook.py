@@ -1,4 +1,4 @@
-"""Figures and axes that notebooks display; `plot` and `save`."""
+"""Figures and axes that notebooks display; `plot`, `thumbnail` and `save`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,9 @@ from matplotlib.figure import Figure as MatplotlibFigure
 from convexrough import checks
 from convexrough.contact import Contact
 from convexrough.errors import InputError
-from convexrough.plots.style import SINGLE, say_nothing
+from convexrough.friction.cycle import Cycle
+from convexrough.friction.path import LoadPath
+from convexrough.plots.style import SINGLE, Scale, legend, say_nothing
 
 #: The module and the function that draw a result into axes, by the name of the result's class. A
 #: module is imported only when its function is needed.
@@ -74,10 +76,7 @@ class Figures(dict[str, MatplotlibFigure]):
     """Figures by stems of file names; notebooks display all of them."""
 
     def _repr_html_(self) -> str:
-        pictures = {stem: b64encode(as_png(figure)).decode() for stem, figure in self.items()}
-        tags = (f'<img alt="{stem}" src="data:image/png;base64,{it}">'
-                for stem, it in pictures.items())  # fmt: skip
-        return "<br>".join(tags)
+        return "<br>".join(image_tag(stem, figure) for stem, figure in self.items())
 
 
 def panels(
@@ -123,6 +122,11 @@ def as_png(figure: MatplotlibFigure) -> bytes:
     return file.getvalue()
 
 
+def image_tag(name: str, figure: MatplotlibFigure) -> str:
+    """The figure as an image inside HTML."""
+    return f'<img alt="{name}" src="data:image/png;base64,{b64encode(as_png(figure)).decode()}">'
+
+
 def plot(result: object, axes: Axes | None = None) -> Axes:
     """Draw the main picture of a result; return the axes.
 
@@ -150,6 +154,24 @@ def plot(result: object, axes: Axes | None = None) -> Axes:
         module, function = where.split(".")
         getattr(import_module(f"convexrough.plots.{module}"), function)(axes, result)
     return axes
+
+
+def thumbnail(result: object) -> str:
+    """A small picture of a result, as an HTML image; of a cycle or path, the map of statuses.
+
+    >>> print(cr.plots.thumbnail(contact)[:36])
+    <img alt="Contact" src="data:image/p
+    """
+    figure, (axes,) = panels(SINGLE, 3.0)
+    if isinstance(result, (Cycle, LoadPath)) and result.contact.loads.any() and len(result.forces):
+        status = result.status if isinstance(result, Cycle) else result.status[-1]
+        maps, scale = import_module("convexrough.plots.asperity_map"), Scale(result.contact)
+        radii = result.contact.contact_radii
+        maps.draw_statuses(axes, scale.points, scale.length, status, radii, outline=scale.axes)
+        legend(axes, "below", handles=maps.status_handles(status))
+    else:
+        plot(result, axes)
+    return image_tag(type(result).__name__, figure)
 
 
 def save(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -25,9 +25,10 @@ TOWARDS_RIM = np.sin(np.linspace(-np.pi / 2, np.pi / 2, 81))
 def press_figures(contact: Contact) -> Figures:
     """The figures of a pressed contact; keys are file names without suffix.
 
-    "pressure" : map of the contact discs; and the pressure along the line of constant y through the
-        touching asperity nearest to the centre, with that of the smooth sphere (Dini & Hills 2009,
-        Fig. 3)
+    "pressure" : map of the contact discs; and the pressure along y = 0 with that of the smooth
+        sphere (Dini & Hills 2009, Fig. 3). If few contact discs cross this line, if asperities are
+        not on a lattice or if very many touch, the second plot shows the peak pressures of all
+        asperities against the distance from the centre
     "loads"    : load of each touching asperity against its distance from the centre
 
     >>> print(*cr.plots.press_figures(contact))
@@ -43,24 +44,19 @@ def press_figures(contact: Contact) -> Figures:
 def pressure_figure(scale: Scale) -> Figure:
     """Map and profile of the pressure."""
     contact = scale.contact
-    figure, (chart, axes) = map_and_profile()
+    figure, (chart, profile) = map_and_profile()
+    style.label(profile, scale.length.label("x"), scale.pressure.label("p"))
     colours = draw_pressure(chart, contact, scale)
     chart.set_xlabel(scale.length.short("x"))
-    y = float(scale.points[np.argmin(np.where(contact.loads > 0, scale.distances, np.inf)), 1])
-    edge = max(map(abs, chart.get_xlim())) * scale.length.size
-    x = abscissae(scale.points - (0.0, y), contact.contact_radii, edge)
-    pressure = fields.pressure(contact, np.column_stack((x, np.full_like(x, y))))
-    axes.fill_between(scale.length.of(x), scale.pressure.of(pressure), facecolor=(ROUGH, 0.2),
-                      edgecolor=ROUGH, lw=float(np.clip(3000 / len(x), 0.2, 0.9)),
-                      rasterized=len(x) > 20 * CROWDED,
-                      label=f"asperities, $y$ = {scale.length.of(y):.3g}")  # fmt: skip
-    if scale.axes:
-        smooth = hertz.pressure(np.hypot(TOWARDS_RIM, y / scale.axes[1]), 1.0, scale.peak)
-        axes.plot(scale.length.of(scale.axes[0] * TOWARDS_RIM), scale.pressure.of(smooth), "--",
-                  lw=1.3, color=ink(), label=scale.name)  # fmt: skip
-    style.label(axes, scale.length.label("x"), scale.pressure.label("p"))
-    style.legend(axes, "above")
-    axes.set(xlim=chart.get_xlim(), ylim=(0.0, 1.04 * colours.get_clim()[1]))
+    crossed = np.count_nonzero(np.abs(scale.points[:, 1]) < contact.contact_radii)
+    touching = np.count_nonzero(contact.loads)
+    in_rows = contact.scene.lattice is not None and crossed**2 >= touching
+    if touching < CROWDED and (in_rows or crossed == touching):
+        _draw_section(profile, scale, chart.get_xlim())
+    else:
+        _draw_peaks(profile, scale)
+    style.legend(profile, "above")
+    profile.set_ylim(0.0, 1.04 * colours.get_clim()[1])
     return figure
 
 
@@ -103,19 +99,57 @@ def abscissae(centres: Array, radii: Array, edge: float) -> Array:
     return np.unique(np.append(places, [-edge, edge]))
 
 
-def _draw_points(axes: Axes, x: Array, y: Array, name: str) -> None:
-    """Draw a dot for each point, or the density of many and, as a line, their median."""
+def _draw_section(axes: Axes, scale: Scale, sides: tuple[float, float]) -> None:
+    """Draw the pressure along y = 0."""
+    contact, edge = scale.contact, max(-sides[0], sides[1]) * scale.length.size
+    x = abscissae(scale.points, contact.contact_radii, edge)
+    rough = scale.pressure.of(fields.pressure(contact, np.column_stack((x, np.zeros_like(x)))))
+    axes.fill_between(scale.length.of(x), rough, facecolor=(ROUGH, 0.2), edgecolor=ROUGH,
+                      lw=float(np.clip(3000 / len(x), 0.4, 0.9)),
+                      label="asperities, $y=0$")  # fmt: skip
+    _draw_smooth(axes, scale, scale.axes[:1], TOWARDS_RIM)
+    axes.set_xlim(*sides)
+
+
+def _draw_peaks(axes: Axes, scale: Scale) -> None:
+    """Draw the peak pressure of each asperity against its distance from the centre."""
+    touching = scale.contact.loads > 0
+    r = scale.length.of(scale.distances[touching])
+    peaks = scale.pressure.of(fields.peak_pressures(scale.contact)[touching])
+    _draw_points(axes, r, peaks, float(peaks.max()), "peaks of all")
+    _draw_smooth(axes, scale, sorted(set(scale.axes)), np.abs(TOWARDS_RIM[40:]))
+    reach = max([scale.typical, *scale.axes])
+    axes.set_xlim(0.0, 1.05 * max(float(r.max()), scale.length.of(reach)))
+    style.label(axes, scale.length.label("r"), scale.pressure.label("p"))
+
+
+def _draw_smooth(axes: Axes, scale: Scale, semi_axes: Sequence[float], s: Array) -> None:
+    """Draw the smooth contact's pressure at fractions s of each semi-axis."""
+    for place, axis in enumerate(semi_axes):
+        p = scale.pressure.of(hertz.pressure(s, 1.0, scale.peak))
+        axes.plot(scale.length.of(axis * s), p, "--", lw=1.3, color=ink(),
+                  label=f"_{scale.name}" if place else scale.name)  # fmt: skip
+
+
+def _draw_points(axes: Axes, x: Array, y: Array, top: float, name: str) -> None:
+    """Draw a dot for each point or, if there are many, their median, and density up to `top`."""
     if len(x) < CROWDED:
         size = float(np.clip(40.0 / np.sqrt(len(x)), 1.2, 4.0))
         axes.plot(x, y, "o", ms=size, mew=0.0, color=ROUGH, label=name, clip_on=False, zorder=3)
         return
-    ends = [to_rgba(ROUGH, 0.15), to_rgba(ROUGH, 0.75)]
-    fading: Any = LinearSegmentedColormap.from_list("density", ends)
-    axes.hist2d(x, y, (80, 60), cmin=1, cmap=fading, norm="log", rasterized=True, lw=0)
-    axes.fill([], [], color=(ROUGH, 0.4), lw=0, label=name)
-    parts = np.array_split(np.argsort(x), 60)
-    middle = [(np.median(x[part]), np.median(y[part])) for part in parts]
-    axes.plot(*np.transpose(middle), color=ROUGH, lw=1.3, label="median")
+    columns, rows = (int(np.clip(len(x) / 50, 20, most)) for most in (80, 60))
+    span = (float(x.min()), float(x.max()))
+    count, across, up = np.histogram2d(x, y, bins=(columns, rows), range=(span, (0.0, top)))
+    most = count.max(axis=1, keepdims=True)
+    share = np.sqrt(np.divide(count, most, out=np.zeros_like(count), where=most > 0))
+    fading = LinearSegmentedColormap.from_list("density", [(1, 1, 1, 0), to_rgba(ROUGH, 0.75)])
+    axes.pcolormesh(across, up, share.T, cmap=fading, vmin=0.0, vmax=1.0, rasterized=True, lw=0)
+    column = np.clip(np.searchsorted(across, x, side="right") - 1, 0, columns - 1)
+    filled = np.unique(column)
+    middle = [np.median(y[column == each]) for each in filled]
+    axes.fill([], [], color=(*to_rgba(ROUGH)[:3], 0.4), lw=0, label=name)
+    axes.plot((across[filled] + across[filled + 1]) / 2, middle, color=ROUGH, lw=1.3,
+              label="median")  # fmt: skip
 
 
 def _loads_figure(scale: Scale) -> Figure:
@@ -126,7 +160,8 @@ def _loads_figure(scale: Scale) -> Figure:
     _draw_smooth_share(axes, scale)
     sure = touching & ~unsure if touching.sum() < CROWDED else touching
     if sure.any():
-        _draw_points(axes, r[sure], share[sure], "touching")
+        top = float(np.quantile(share[sure], 0.9999))
+        _draw_points(axes, r[sure], share[sure], top, "touching")
     if unsure.any():
         axes.plot(r[unsure], share[unsure], "x", ms=4, mew=0.8, color=UNSURE, label="undecided",
                   clip_on=False, rasterized=unsure.sum() >= CROWDED, zorder=3)  # fmt: skip
