@@ -55,10 +55,9 @@ LEEWAY, LEAST_LEEWAY = 3e-4, 1e-12
 #: overlapping shells.
 FACTORISED = 1500
 
-#: The radius of an overlapping shell is at first the larger of w t and WIDENED t / (1 - c)^(1/2).
-#: Here w is one of WIDTHS, tried in this order (the cheapest first), and c is the largest (t_i
-#: t_j)^(1/2) / r_ij with one of the NEAREST neighbours j. The radius is then raised, where that is
-#: larger, to the radius of such a neighbour minus LESS times its distance.
+#: The radius of an overlapping shell is at first the larger of w t and WIDENED t / (1 - c)^(1/2),
+#: where w is one of WIDTHS (the cheapest first), and c is `closest` among the NEAREST neighbours.
+#: It is then raised to at least the radius of such a neighbour minus LESS times its distance.
 WIDTHS, WIDENED, LESS, NEAREST = (4.0, 8.0), 3.0, 0.5, 8
 
 #: Largest number of pairs of overlapping shells, divided by the number of asperities, for memory.
@@ -99,9 +98,8 @@ class Box(NamedTuple):
         """A box that contains this one, to be tried at another load or approach of `problem`: the
         proof must show that all loads are below its upper ends.
 
-        If shells prove the convexity on this box, an upper end above 0 is raised, so that small
-        loads get upper ends far above their error bounds, to the load at which `shells` / h equals
-        the convexity number of the box, if that load is larger.
+        If shells prove the convexity on this box, upper ends above 0 are raised to where they still
+        do, so that small loads get upper ends far above their error bounds.
         """
         theta = self.convexity_number
         ends = (2.0 / 3.0 * problem.coefficients * theta / self.shells) ** 3
@@ -115,9 +113,8 @@ class Box(NamedTuple):
 
 
 def widest(problem: NormalProblem, loads: Array, highest: Any) -> Box:
-    """The box that contains every solution, and `loads`; for a stack, one box for each row.
-
-    If its convexity number is below 1, the shells of the problem prove the convexity.
+    """The box that contains every solution, and `loads`; for a stack, one box for each row. If its
+    convexity number is below 1, the shells of the problem prove the convexity.
 
     highest : upper bound on the approach at every solution
     """
@@ -215,10 +212,8 @@ def _scaled(influence: Influence, compliance: Array) -> tuple[Array, float]:
 
 
 def crowded(problem: NormalProblem, loads: Array) -> Indices:
-    """Indices of loaded asperities that probably prevent a proof of convexity.
-
-    They are the asperities of pairs that are too close for convexity; if there is no such pair, the
-    asperities whose shells of radius t_i meet another shell; if no shells meet, all of them.
+    """Indices of loaded asperities that probably prevent a proof of convexity: those of pairs that
+    are too close; without such pairs, those whose shells of radius t_i meet another; else all.
     """
     which = np.flatnonzero(loads)
     influence = problem.influence.restricted(which)

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough import checks
 from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, Indices, frozen
-from convexrough.influence import Kind, couple
+from convexrough.influence import Kind
 from convexrough.normal.boxes import Box, Scope, highest_by_rates
 from convexrough.normal.level import Level
 from convexrough.normal.problem import ALL_SHARP, NormalProblem
@@ -27,7 +27,6 @@ from convexrough.normal.refine import Trial, refined, trial_of
 from convexrough.record import Along, Proved
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
-from convexrough.sphere import hertz
 
 #: Statuses by their codes.
 STATUSES = np.array(["undecided", "contact", "open"])
@@ -65,9 +64,9 @@ class Certificate(Proved):
     approach_error : [length] bound on |approach - approach of the solution|; 0 if prescribed
     duality_gap : [force length] upper bound on the energy of these loads minus that of the
         solution, which has the least energy if the scope is "global". The bound is infinite if
-        nothing is proved, or if the energy is not proved convex between the loads and the solution.
-        If the total load is prescribed, the energy is that of the loads scaled to the total, and
-        the bound is infinite if asperities that cannot touch have loads
+        nothing is proved, if the energy is not proved convex between the loads and the solution,
+        and if asperities that cannot touch, or that the proof fixes open, have loads. If the total
+        load is prescribed, the energy is that of the loads scaled to the total
     fixed_open : number of asperities that the proof assumes to be open, and then proves to be open
         in the solution that it finds. Where this is not 0 (crowded contacts), nearby solutions in
         which one of these asperities touches are not excluded
@@ -262,7 +261,8 @@ def certificate_of(level: Level, loads: Array, start: Trial) -> Certificate:
     codes = depths.codes()
     codes[problem.candidates[level.touching]] = TOUCHING
     codes[problem.candidates[level.open]] = OPEN
-    energy += _screened_energy(depths, loads)
+    if np.count_nonzero(loads) > np.count_nonzero(loads[problem.candidates]):
+        energy = np.inf  # loads on asperities that cannot touch
     return Certificate(
         scope="local" if possible else "global",
         convexity_number=box.convexity_number,
@@ -301,14 +301,13 @@ class Depths:
     def __call__(self) -> tuple[Array, ...]:
         """(N,) [length] indentations of all asperities of the scene, and their error bounds."""
         with self.problem.one_thread():
-            beyond = self.of_screened
+            beyond = self.of_screened()
         whole = tuple(self.problem.to_scene(each) for each in (self.value, self.error))
         for each, outer in zip(whole, beyond, strict=True):
             each[self.problem.screened] = outer
             each *= self.problem.units.length
         return whole
 
-    @cached_property
     def of_screened(self) -> tuple[Array, Array]:
         """(m,) indentations of the asperities `screened`, and their error bounds."""
         n, errors = self.problem.beyond(self.loads, self.approach)
@@ -327,7 +326,7 @@ class Depths:
         level = (self.problem.scene.offsets[which] == 0) & (self.problem.highest == 0)
         codes[which[~level]] = OPEN
         if level.any():
-            n, errors = self.of_screened
+            n, errors = self.of_screened()
             codes[which[n < -errors]] = OPEN
         return codes
 
@@ -341,56 +340,24 @@ def _energy_error(found: Level, box: Box, start: Trial, moved: Array) -> float:
     """Bound on Phi(P) - Phi(P*), the energy of the loads P minus that of the solution P*.
 
     It is e'|P - P*| with the violations e of the contact law at P and |P - P*| <= `moved`, if Phi
-    is proved convex between P and P*; else infinite. Loads q on asperities fixed open add at most
-    e'q; setting these loads to 0 changes the residuals by A q.
+    is proved convex between P and P*, and no asperity that is fixed open has a load; else infinite.
     """
     problem, loads, excess = found.problem, start.loads.high, start.excess
     if start is found.trial:  # P: these loads, rounded and perhaps rescaled to the total
         excess = excess + 2 * ROUNDOFF * (start.local + start.product.size)
         moved = moved + ROUNDOFF * loads
-    most, opened = loads * (1 + SAFETY), box.fixed_open
-    if opened.any():
-        excess = np.where(opened & (loads == 0), 0.0, excess)
-        if (opened & (loads > 0)).any():
-            q = np.where(opened, most, 0.0)
-            displacement = problem.influence.apply(q)
-            excess = excess + displacement + problem.influence.rounding(q).of(displacement)
-        most[opened] = 0.0
+    most = np.maximum(loads * (1 + SAFETY), box.loads)
+    if (box.fixed_open & (loads > 0)).any():
+        return np.inf
     if (most > box.loads).any():  # on the box A >= -theta H, theta = box.convexity_number
-        most = np.maximum(box.loads, most)
         # Up to `most`, H is at least cbrt(part) times its value at the upper ends of the box.
         part = np.divide(box.loads, most, out=np.ones(len(most)), where=most > 0).min()
         convex = np.cbrt(part) > box.convexity_number * (1 + SAFETY)
         if not (convex or box.convexity_at(problem.compliance(most)) < 1):
             return np.inf
     missing = float(start.missing.size * max(found.approach.size, start.approach.size))
+    excess = np.where(box.fixed_open, 0.0, excess)
     return (float(excess @ moved) + missing) * (1 + SAFETY + len(moved) * ROUNDOFF)
-
-
-def _screened_energy(depths: Depths, loads: Array) -> float:
-    """Bound on sum (3/5) k s^(5/3) + g's + s'A s / 2, the energy of loads s on asperities that
-    cannot touch, with their gaps g; infinite if there are such loads under load control.
-    """
-    problem, screened = depths.problem, loads > 0
-    screened[problem.candidates] = False
-    which = np.flatnonzero(screened)
-    if len(which) == 0:
-        return 0.0
-    if problem.load is not None:  # these loads change the scaling of the others
-        return np.inf
-    # Loads that underflow in scaled units count as the smallest positive number.
-    s = np.maximum(loads[which] / problem.units.force, checks.SMALLEST)
-    modulus, radii = problem.scene.material.contact_modulus, problem.scene.relative_radii[which]
-    coefficients = hertz.local_coefficient(modulus, radii)
-    coupling = couple(problem.scene, which, problem.influence.scale, None)
-    moved = coupling.apply(s)
-    moved += coupling.rounding(s).of(moved)
-    local = 0.6 * hertz.indentation(s, coefficients * problem.units.local)
-    indentation, errors = (each[screened[problem.screened]] for each in depths.of_screened)
-    energy = float(s @ (local + (errors - indentation) + 0.5 * np.maximum(moved, 0.0))) * (
-        1 + SAFETY
-    )
-    return max(energy, checks.SMALLEST)
 
 
 def _other_solutions(level: Level, box: Box) -> tuple[bool, float, bool]:

@@ -74,12 +74,9 @@ def proved(problem: NormalProblem, state: Trial, box: Box | None = None) -> Leve
 
 @np.errstate(all="ignore")
 def solution_in(problem: NormalProblem, box: Box, state: Trial) -> tuple[Any, Array, Level]:
-    """Three results on the solution near the trial loads. If the first is False, the other two
-    prove nothing.
-
-    1. True if it is proved that the box contains the solution; (m,) for a stack of m problems.
-    2. (n,) bounds on the errors of the trial loads, by the theorem on the box.
-    3. The level, by the theorem on a smaller box that contains the solution.
+    """Three results on the solution near the trial loads: True if it is proved that the box
+    contains the solution, (m,) for a stack (if False, the other two prove nothing); (n,) bounds on
+    the errors of the trial loads; and the level, by the theorem on a smaller box.
     """
     trial, (extra, coupled, bent) = state.loads.high, _missing(problem, state)
     residual = np.where(box.fixed_open, 0.0, state.excess + bent)
@@ -151,10 +148,9 @@ def _approach_error(
 ) -> Any:
     """Bound on |D0 - D0*|, the error of the approach.
 
-    At every touching asperity, D0* = k P*^(2/3) + A P* - d. At an open asperity, D0* is at most
-    this right side, because gaps are not negative. So if no asperity is proved to touch, the least
-    right side bounds D0* from above. The lower bound on D0* is -max d, the approach at which
-    contact begins.
+    At every touching asperity, D0* = k P*^(2/3) + A P* - d; at an open one, D0* is at most this
+    right side. So if none is proved to touch, the least right side bounds D0* from above. The lower
+    bound on D0* is -max d, the approach at which contact begins.
     """
     if problem.load is None:
         return state.approach.radius

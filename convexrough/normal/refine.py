@@ -1,11 +1,8 @@
 """The contact law with error bounds, and loads refined to more digits than float64 has.
 
 Functions take one problem or a stack (`normal.stack`) of m problems, with arrays (n,) or (m, n).
-Quantities with one number per problem are numbers or (m, 1).
-
-The loads P are pairs, sums of two float64 numbers. Their residual  k P^(2/3) + A P - d - D0
-(symbols of `normal.problem`) is a ball, whose radius bounds the errors of the data, the product and
-the arithmetic. A correction is one step of docs/theory/newton.md in float64.
+The loads P are pairs; their residual  k P^(2/3) + A P - d - D0  (symbols of `normal.problem`) is a
+ball. A correction is one step of docs/theory/newton.md in float64.
 """
 
 from __future__ import annotations

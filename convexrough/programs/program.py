@@ -115,10 +115,8 @@ class Program(Record):
         return self.energy_unit * (sign * checks.finite("objective", objective) + self.constant)
 
     def save(self, path: Path | str) -> None:
-        """Write the program to a file, in the format of the file's ending.
-
-        cones, dual : .cbf, .json (Clarabel) or .npz (sparse matrices)
-        bristles    : .mps or .npz (qpsolvers, dense)
+        """Write the program to a file in the format of its ending: .cbf, .json (Clarabel) or .npz
+        (sparse matrices); for bristles .mps or .npz (qpsolvers, dense).
 
         Raises InputError for other endings, and FileError if the file cannot be written.
         """
@@ -239,35 +237,26 @@ def write_programs(
     formats: Collection[str],
     bristles: int,
 ) -> dict[str, Any]:
-    """Write a file NAME.FORM.ENDING for each form and format, and index.json.
+    """Write a file NAME.FORM.ENDING for each form and format by `write`, and index.json, whose
+    contents are returned.
 
-    Returns the contents of the index.
+    formats : file endings; all if there are none
 
-    write    : writes a file, given its name and contents
-    approach, load : [length], [force] the prescribed quantity, exactly one of the two
-    formats  : file endings; all if there are none
-    bristles : number of bristles per asperity
-
-    A program is left out if the solution is not in the box on which it is exact, or if its file
-    would not fit in memory; the index gives the reason. If no program remains, the last of these
-    reasons is raised, a ConvexroughError.
+    Other arguments are those of `program`. A program is left out if the solution is not in the box
+    on which it is exact, or if its file would not fit in memory; the index gives the reason. If no
+    program remains, the last of these reasons is raised, a ConvexroughError.
     """
     problem, own = solved(scene, approach, load)
     about, left_out = dict[str, Any](), dict[str, str]()
     for form, writers in WRITERS.items():
-        endings = [ending for ending in writers if ending in formats or not formats]
-        try:
-            program = stated(problem, own, form, bristles) if endings else None
-        except ConvexroughError as error:
-            left_out[form], last = str(error), error
-            continue
+        program, endings = None, [each for each in writers if each in formats or not formats]
         for ending in endings:
-            assert program is not None
             file = f"{name}.{form}.{ending}"
             try:
+                program = program or stated(problem, own, form, bristles)
                 content = writers[ending](program.data)
-            except InputError as error:
-                left_out[file], last = str(error), error
+            except ConvexroughError as error:
+                left_out[file if program else form], last = str(error), error
                 continue
             write(file, content)
             about[file] = program.about() | sizes(ending, content)
@@ -304,7 +293,7 @@ def _value(program: ConeProgram | QuadraticProgram, x: Array) -> float:
 
 def _bristle_error(rows: BristleProgram, own: Array) -> float:
     """Estimated error of the loads of the bristle program, divided by the largest load: at most
-    0.375 B / m^2 for one asperity (`solvers.bristles`), times up to about 1 / lambda by
+    0.375 B / m^2 for one asperity (docs/theory/bristles.md), times up to about 1 / lambda by
     interaction, with the smallest of the `scaled_eigenvalues` as lambda.
     """
     row = 0.375 * float(rows.box.max() / own.max()) / rows.m**2

@@ -1,38 +1,8 @@
 """The contact as one quadratic program for OSQP: each Hertz contact becomes a row of springs.
 
-In the method of dimensionality reduction (Popov and Hess 2015) Hertz's energy of a load P is the
-minimum of a quadratic program. Independent springs, the bristles, lie on |x| <= b. They have the
-stiffness E* per length; the bristles at x and -x count as one, with the stiffness 2 E* per length.
-The bristle at x first touches at the indentation x^2 / R_i:
-
-    (3/5) k P^(5/3) = min { integral f^2 / (4 E*) + (x^2 / R_i) f  dx :  f >= 0,  integral f = P },
-
-with integrals over 0 <= x <= b, for every P whose contact radius is at most b. At the indentation
-delta the minimiser is f = 2 E* max(delta - x^2 / R_i, 0). Let f be constant on each of m equal
-cells, with the mean of x^2 / R_i over the cell in place of x^2 / R_i. The minimum is then an upper
-bound on the energy. In scaled units let B_i be the load at which asperity i has the contact radius
-b_i.
-Under this load its indentation is d_i = k B_i^(2/3), and its compliance is
-h_i = (2/3) k B_i^(-1/3) = 1 / (2 E* b_i). Let phi_ij / m be the force on cell j:
-
-    P_i = mean_j phi_ij,    energy_i = mean_j [h_i phi_ij^2 / 2 + d_i c_j phi_ij],
-    c_j = (j^2 - j + 1/3) / m^2,    j = 1, ..., m.
-
-At a given indentation P is exact if the contact ends on the edge of a cell. Otherwise the error of
-P is at most 0.375 B_i a / (b_i m^2), where a is the contact radius.
-
-Convexity. With phi_ij = P_i + e_ij and sum_j e_ij = 0 the program is, for the compliance operator A
-and prescribed displacements D,
-
-    minimise    P'(A + diag(h)) P / 2 + sum_ij h_i e_ij^2 / (2 m) + sum_ij d_i c_j phi_ij / m - D'P
-    subject to  P_i + e_ij >= 0,   sum_j e_ij = 0        (and sum P_i = L under load control).
-
-For any m its matrix is positive definite exactly if A + diag(h) is. A + diag(h) is the Hessian of
-the contact energy at the upper ends of the box P <= B. The program first takes the a priori bounds
-on the loads for B. If a Cholesky factorisation does not find A + diag(h) positive definite, the box
-is cut at b_i = 0.99 (pi/2) s_i, where s_i is half the distance to the nearest neighbour. For the
-cut box the shell lemma of docs/theory/convexity.md proves definiteness. If a load of the answer
-reaches an upper end that was cut, the answer is refused.
+docs/theory/bristles.md derives the program, its error and the box B on which it is convex. In
+scaled units, phi_ij / m is the force on cell j of asperity i, h_i the compliance and d_i the
+indentation under the load B_i. The variables are P_i = mean_j phi_ij and e_ij = phi_ij - P_i.
 """
 
 from __future__ import annotations

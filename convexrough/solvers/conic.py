@@ -1,15 +1,9 @@
 """The contact law as one second-order cone program, and its solution by Clarabel.
 
-docs/theory/exact-cones.md states the program (1) and proves that its solution satisfies the contact
-law. The sigma_i of that page are `NormalProblem.shells`. D_i is the sum of the offset and the
-approach. If the load is prescribed, the approach is unknown, and an upper bound replaces it.
-
-The loads are limited to boxes 0 <= P_i <= B_i ("Choice of the box" there). With Hertz's
-coefficients k_i, the number S_i = (3/2) sigma_i B_i^(1/3) / k_i must be at most 21/25 in the form
-of the program with four cones per asperity, and at most 1 in the form with five. Where S_i would be
-larger, B_i is reduced. A box is called cut if B_i is below the a priori bound, which is the load
-that the asperity would carry alone. If a cut box limits a load, the program with five cones is
-tried; if a cut box limits a load again, the scene is refused.
+docs/theory/exact-cones.md states the program, and proves that its solution satisfies the contact
+law. The sigma_i of that page are `NormalProblem.shells`. If the load is prescribed, an upper bound
+replaces the approach. "Choice of the box" there explains the boxes 0 <= P_i <= B_i, when a box is
+cut, and when five cones per asperity replace four, or the scene is refused.
 """
 
 from __future__ import annotations
@@ -35,9 +29,7 @@ from convexrough.sphere import hertz
 #: out of the program. The Newton step can still give them a load. A heuristic: loads are checked.
 NEGLIGIBLE = 1e-12
 
-#: Contact radius at the upper end of a box, divided by that at the a priori bound on the load: at
-#: this bound an isolated asperity would have a slack and a multiplier that are both 0, with which
-#: interior-point methods lose half their digits. A heuristic.
+#: Contact radius at the upper end of a box, divided by that at the a priori bound on the load.
 WIDENED = 1.1
 
 #: With a Newton step: the largest accepted residual of the contact law (|gap| at loaded asperities,
@@ -159,11 +151,8 @@ class ConeSolver(ABC):
         return f"{self.formulation} + Newton step" if self.newton_step else self.formulation
 
     def solve(self, problem: NormalProblem, start: Array | None = None) -> Solution:
-        """The solution in scaled units, by four cones or, if a cut box limits a load, by five.
-
-        start : not used
-
-        Raises SolverError and TooDenseError if a check fails.
+        """The solution in scaled units; `start` is not used. Raises SolverError and TooDenseError
+        if a check fails.
         """
         try:
             return solve_in(self, problem, ConeBoxes.choose(problem))
@@ -186,7 +175,6 @@ def judged(
     """The solver's answer as a `Solution`, after the checks that `ConeSolver` describes.
 
     An asperity counts as open where D - A P <= 0, even if its computed load is not exactly 0.
-    Raises SolverError or TooDenseError if a check fails.
     """
     if not (np.isfinite(answer.loads).all() and np.isfinite(answer.approach)):
         raise SolverError(
@@ -226,12 +214,9 @@ def judged(
 def _after_newton_step(
     solver: ConeSolver, problem: NormalProblem, loads: Array, alone: Array
 ) -> Solution:
-    """The solution after one or two Newton steps from P = `loads`, or where better from `alone`,
-    Hertz's loads at the indentations D - A P.
-
-    An error e of the loads changes k_i P_i^(2/3) by h_i e_i, with the compliance h_i, and D - A P
-    by -A e. So the load `alone` of asperity i is more accurate if h_i exceeds the sum of row i of
-    A. The first step then starts from this load, and otherwise from that in `loads`.
+    """The solution after one or two Newton steps from P = `loads` or, where the compliance exceeds
+    the sum of the row of A, from `alone`, Hertz's loads at the indentations D - A P: they are less
+    sensitive to errors of the loads there.
     """
     light = problem.compliance(loads) > problem.influence.apply(np.ones(len(problem)))
     loads = np.where(light, alone, loads)

@@ -1,9 +1,8 @@
 """Optimisation programs in standard form, their solution by libraries, and the answers.
 
 A reduction converts a contact problem to a program, and the answer back, as in cvxpy (Agrawal,
-Verschueren, Diamond and Boyd, J. Control Decis. 5 (2018) 42): `conic.lifted_program` and
-`conic.answer_of`, or `apply` and `invert` of `bristles.BristleProgram`. docs/how-to/solvers.md
-shows how to add a solver.
+Verschueren, Diamond and Boyd, J. Control Decis. 5 (2018) 42). docs/how-to/solvers.md shows how to
+add a solver.
 """
 
 from __future__ import annotations
@@ -42,9 +41,9 @@ class ConeProgram(NamedTuple):
         """The dual in the same form: minimise (1/2) v'P v + b'z,  P v + A'z = -q,  z in the cones.
 
         The variables are (v, z). v has one entry for each x_i of this program with P_ii != 0. The
-        first `equalities` entries of z are free. At any feasible point, the negative of the dual's
-        objective is a lower bound on the minimum of this program. At the solution, this bound
-        equals the minimum, and the multipliers of the equations are -x.
+        first `equalities` entries of z are free. At any feasible point, minus the objective is a
+        lower bound on the minimum of this program; at the solution the multipliers of the equations
+        are -x.
         """
         from scipy import sparse  # takes 0.1 s to import
 

@@ -249,17 +249,6 @@ def test_the_duality_gap_is_that_of_float64_loads(control: str, off: float) -> N
         assert certificate.duality_gap <= 3 * above
 
 
-@pytest.mark.parametrize("size", [1e-18, 1e-13, 1e-9])
-def test_the_duality_gap_counts_loads_on_screened_asperities(size: float) -> None:
-    scene, approach = scenes.NAMED["rough"]
-    contact, exact = (f(scene, approach=approach) for f in (cr.press, scenes.reference))
-    wrong = contact.loads.copy()
-    wrong[np.argmax(scene.asperities.distances)] += size * contact.load
-    above = excess(scene, wrong, exact)
-    gap = cr.certify(scene, wrong, approach=approach).duality_gap
-    assert 0 < above <= gap <= 1.01 * above + contact.certificate.duality_gap
-
-
 @pytest.mark.parametrize("factor", [3.0, 1e25])
 def test_loads_far_too_large_under_load_control(factor: float) -> None:
     """Scaled to the total they are right; as they are, they are off by all but a little."""
@@ -283,14 +272,12 @@ def test_a_load_too_small_for_own_units_is_not_lost(control: str) -> None:
 
 
 def test_the_energy_of_loads_where_nothing_can_touch() -> None:
-    """It is known at a prescribed approach; under a prescribed load it changes the scaling."""
     scene = scenes.paper()
     contact = cr.press(scene, load=1e-8)
     assert 60 not in NormalProblem.assemble(scene, load=1e-8).candidates
     loads = contact.loads.copy()
     loads[60] = 1e-3 * loads.max()
-    at_approach = cr.certify(scene, loads, approach=contact.approach)
-    assert 0 < at_approach.duality_gap < np.inf
+    assert cr.certify(scene, loads, approach=contact.approach).duality_gap == np.inf
     assert cr.certify(scene, loads * (1e-8 / loads.sum()), load=1e-8).duality_gap == np.inf
     assert cr.certify(scene, contact.loads, load=1e-8).duality_gap < 1e-20
 
@@ -338,7 +325,8 @@ def test_random_points_are_judged_honestly(
         assert_honest(judged, wrong, exact)
         if "approach" in control:
             assert excess(scene, wrong, exact) <= judged.duality_gap
-            assert digits > -10 or judged.duality_gap < 1e-9 * 5e-5 * contact.load
+            known = digits > -10 or judged.duality_gap < 1e-9 * 5e-5 * contact.load
+            assert known or (judged.duality_gap == np.inf and judged.fixed_open)
 
 
 @pytest.mark.sample(1)
