@@ -11,8 +11,6 @@ from functools import cache
 from typing import Any, TypeVar
 
 Part = TypeVar("Part")
-One = TypeVar("One")
-Other = TypeVar("Other")
 
 #: Up to this many numbers, the work takes less time than sharing it among threads.
 MANY = 2**17
@@ -39,35 +37,20 @@ def each(work: Callable[[Part], object], parts: Iterable[Part], threads: int) ->
         for part in todo:
             work(part)
 
-    others = [_submitted(some) for _ in range(threads - 1)]
+    others: list[Future[None]] = []
     try:
+        for _ in range(threads - 1):
+            try:
+                others.append(_pool().submit(some))
+            except RuntimeError as error:  # also where the process ends: this thread does the work
+                if "shutdown" not in str(error):
+                    raise  # the system refuses another thread
         some()
     finally:
-        started = [other for other in others if other and not other.cancel()]
+        started = [other for other in others if not other.cancel()]
         wait(started)
     for other in started:
         other.result()  # raises its error
-
-
-def both(first: Callable[[], One], second: Callable[[], Other]) -> tuple[One, Other]:
-    """The results of first() and second(), which run at the same time."""
-    other = _submitted(second)
-    try:
-        found = first()
-    finally:
-        started = [other] if other and not other.cancel() else []
-        wait(started)
-    return found, started[0].result() if started else second()
-
-
-def _submitted(work: Callable[[], One]) -> Future[One] | None:
-    """The future of work() in another thread; None where the process ends."""
-    try:
-        return _pool().submit(work)
-    except RuntimeError as error:
-        if "shutdown" in str(error):
-            return None
-        raise  # the system refuses another thread
 
 
 @cache

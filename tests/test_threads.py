@@ -59,21 +59,20 @@ def test_an_error_of_any_thread_is_raised_when_no_thread_works_any_more(fails: i
     with pytest.raises(ZeroDivisionError):
         threads.each(work, [0, 9, 1, 2, 3], 2)
     assert len(ended) == 4
-    ended.clear()
-    with pytest.raises(ZeroDivisionError):
-        threads.both(lambda: work(0), lambda: work(9))
-    assert len(ended) == 1
 
 
 def met() -> list[int]:
     """[0, 1] if two threads run at once."""
-    meeting = threading.Barrier(2, timeout=10)
-    return sorted(threads.both(meeting.wait, meeting.wait))
+    meeting, found = threading.Barrier(2, timeout=10), list[int]()
+    threads.each(lambda _: found.append(meeting.wait()), range(2), 2)
+    return sorted(found)
 
 
-def test_both_run_at_once_and_may_be_nested() -> None:
+def test_two_run_at_once_and_may_be_nested() -> None:
     assert met() == [0, 1]
-    assert threads.both(lambda: 1, lambda: threads.both(lambda: 2, lambda: 3)) == (1, (2, 3))
+    found = list[list[int]]()
+    threads.each(lambda _: found.append(squares()), range(2), 2)
+    assert found == [[0, 1, 4], [0, 1, 4]]
 
 
 def fork() -> None:
@@ -85,7 +84,7 @@ def fork() -> None:
 def end() -> None:
     def late() -> None:
         time.sleep(0.2)  # the first thread has ended
-        print(squares(), threads.both(lambda: 1, lambda: 2))
+        print(squares())
 
     threading.Thread(target=late).start()
 
@@ -103,4 +102,4 @@ def test_a_forked_process_makes_threads_of_its_own() -> None:
 
 
 def test_work_is_done_after_the_first_thread_has_ended() -> None:
-    assert output_of("end").split("\n")[0] == "[0, 1, 4] (1, 2)"
+    assert output_of("end").split("\n")[0] == "[0, 1, 4]"

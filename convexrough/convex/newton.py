@@ -65,8 +65,7 @@ class Law(Protocol):
 
     def evaluate(self, unknown: Array) -> Iterate | None:
         """The state at eta = `unknown`, which is changed where needed to satisfy the constraints,
-        such as a prescribed total; None if that is impossible.
-        """
+        such as a prescribed total; None if that is impossible."""
 
     def direction(self, state: Iterate, left: float) -> Array:
         """The step d of eta; the 2-norm of F + F' d is at most about `left` times that of F."""

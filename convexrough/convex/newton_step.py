@@ -171,8 +171,7 @@ def _iterate(
 
     def smoothed(residual: Values) -> tuple[Values, float, float]:
         """M r for the residual r, projected; the 2-norm of A W r; and r' M r without projection.
-        If balanced, `residual` is changed in place.
-        """
+        If balanced, `residual` is changed in place."""
         nonlocal beta
         if smooth:
             z, left = smooth(residual)

@@ -25,16 +25,14 @@ from convexrough.roundoff import SAFETY
 def excess(residual: Ball, inside: NDArray[np.bool_]) -> Array:
     """(n,) violations e of the first-order conditions, from the `residual` F - beta of the gradient
     F of the energy and the multiplier beta of the total. `inside` is False at a lower bound; at an
-    upper bound, the result |F - beta| is at least as large as the violation.
-    """
+    upper bound, the result |F - beta| is at least as large as the violation."""
     wrong = np.maximum(-residual.lower, 0.0)
     return np.where(inside, np.maximum(residual.upper, wrong), wrong)
 
 
 def distance(excess: Array, h: Array, margin: float | Array) -> Any:
     """The right side of (1): a number, or (m, 1) for (m, n) violations e = `excess`. H has the
-    diagonal h, infinite where x is fixed, and mu is the `margin`.
-    """
+    diagonal h, infinite where x is fixed, and mu is the `margin`."""
     most = largest(excess)
     with np.errstate(all="ignore"):
         squared = summed((excess / np.where(most > 0, most, 1.0)) ** 2 / h)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -225,14 +225,17 @@ class Product:
     def apply(self, loads: NDArray[Any]) -> NDArray[Any]:
         """(n,) the sums. A second thread computes the product with S at the same time."""
         ordered = loads[self.mesh.places]
+        found: dict[bool, NDArray[Any]] = {}
 
-        def far() -> NDArray[Any]:
-            field = self.mesh.to_nodes(ordered)
-            return self.mesh.from_nodes(self.mesh.box.convolve(field, self.kernel.spectrum))
+        def part(far: bool) -> None:
+            if far:
+                field = self.mesh.box.convolve(self.mesh.to_nodes(ordered), self.kernel.spectrum)
+                found[far] = self.mesh.from_nodes(field)
+            else:
+                found[far] = self.near.apply(ordered)
 
-        total, near = threads.both(far, partial(self.near.apply, ordered))
-        total += near
-        return self.mesh.back(total)
+        threads.each(part, (True, False), 2)
+        return self.mesh.back(found[True] + found[False])
 
     def interpolation(self, strengths: Array) -> Array:
         """(n,) bounds on errors of the sums of strengths_j / r_ij^q, for `strengths` (n,) >= 0.

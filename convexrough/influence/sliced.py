@@ -128,8 +128,7 @@ class Sliced:
     @classmethod
     def of(cls, box: SiteBox, values: Distances, norm: float, unit: float, count: int) -> Sliced:
         """The kernel divided into `count` slices; its 2-norm is at most 1.01 `norm`, and that of
-        the errors of its values at most `norm` times `values.error`.
-        """
+        the errors of its values at most `norm` times `values.error`."""
         rows, columns = box.shape
         places = math.sqrt((2.0 * rows - 1.0) * (2.0 * columns - 1.0))
         sites = math.sqrt(float(rows * columns))

@@ -43,9 +43,9 @@ Scope = Literal["global", "local", "none"]
 #: 1 - FITTED (docs/theory/certificate.md, "Choice of the box", 3).
 FIT_FROM, FITTED = 0.8, 0.9
 
-#: Margins mu with which a Cholesky factorisation is tried, the largest first; and those on a box of
-#: touching asperities, where the energy may be barely convex.
-MARGINS, CROWDED_MARGINS = (0.1, 1e-3), tuple((1e-4 * 2.0 ** np.arange(12)).tolist())
+#: Margins mu with which a Cholesky factorisation is tried; and those on a box of touching
+#: asperities, where the energy may be barely convex.
+MARGINS, CROWDED_MARGINS = (1e-3, 0.1), tuple((1e-4 * 2.0 ** np.arange(12)).tolist())
 
 #: The upper ends of a box of touching asperities exceed each load by at least LEEWAY times the load
 #: plus LEAST_LEEWAY times the largest load.
@@ -126,8 +126,7 @@ def widest(problem: NormalProblem, loads: Array, highest: Any) -> Box:
 
 def tried(problem: NormalProblem, loads: Array, displacement: Ball) -> Box | None:
     """The global box, which contains every solution, if convexity on it is proved; or else a local
-    box, which contains `loads`; or None. `displacement` (n,) is A times `loads`.
-    """
+    box, which contains `loads`; or None. `displacement` (n,) is A times `loads`."""
     box = widest(problem, loads, problem.overhang(loads, displacement))
     if not box.convexity_number < 1 and problem.influence.stored:
         if problem.by_load:
@@ -187,8 +186,7 @@ def box_of_touching(
     number = convexity_number(shells, h)
     if not number < 1:
         if influence.stored or len(which) <= FACTORISED:
-            scaled, error = _scaled(influence, own)
-            margin = largest(CROWDED_MARGINS, lambda mu: proved_margin(scaled, (mu,), error) > 0)
+            margin = convex_margin(influence, own, CROWDED_MARGINS)
         else:
             margin = overlapping_margin(influence, influence.scale / own, CROWDED_MARGINS)
         number = 1.0 - margin
@@ -198,23 +196,17 @@ def box_of_touching(
 
 
 def convex_margin(influence: Influence, compliance: Array, margins: Sequence[float]) -> float:
-    """The first mu of `margins` for which Cholesky's factorisation proves  H + A >= mu H,  with the
-    diagonal H of `compliance`; 0 if there is none.
-    """
-    scaled, error = _scaled(influence, compliance)
-    return proved_margin(scaled, margins, error)
-
-
-def _scaled(influence: Influence, compliance: Array) -> tuple[Array, float]:
-    """H^-1/2 A H^-1/2 with H = diag(`compliance`), and a bound on its relative errors."""
+    """The largest mu of the increasing `margins` for which Cholesky's factorisation proves
+    H + A >= mu H,  with the diagonal H of `compliance`; 0 if there is none."""
     root = 1.0 / np.sqrt(compliance)
-    return influence.matrix * root * root[:, None], influence.entry_error + 8 * ROUNDOFF
+    scaled = influence.matrix * root * root[:, None]
+    error = influence.entry_error + 8 * ROUNDOFF
+    return largest(margins, lambda mu: proved_margin(scaled, (mu,), error) > 0)
 
 
 def crowded(problem: NormalProblem, loads: Array) -> Indices:
     """Indices of loaded asperities that probably prevent a proof of convexity: those of pairs that
-    are too close; without such pairs, those whose shells of radius t_i meet another; else all.
-    """
+    are too close; without such pairs, those whose shells of radius t_i meet another; else all."""
     which = np.flatnonzero(loads)
     influence = problem.influence.restricted(which)
     t = influence.scale / problem.compliance(loads)[which]
@@ -228,8 +220,7 @@ def crowded(problem: NormalProblem, loads: Array) -> Indices:
 
 def overlapping_margin(influence: Influence, lengths: Array, margins: Sequence[float]) -> float:
     """The largest of `margins` mu for which  H + A >= mu H  is proved by the first shells that
-    prove any of them; 0 if there is none. `lengths` (n,) are t_i = 1 / (pi E* h_i).
-    """
+    prove any of them; 0 if there is none. `lengths` (n,) are t_i = 1 / (pi E* h_i)."""
     points = influence.points
     if len(points) > MOST_ELIMINATED:
         return 0.0
@@ -252,8 +243,7 @@ def overlapping_margin(influence: Influence, lengths: Array, margins: Sequence[f
 
 def nearest(points: Array, lengths: Array) -> tuple[Array, Indices, Array]:
     """(n, m) distances to the m nearest neighbours, (n, m) indices of these neighbours, and (n,)
-    the largest (t_i t_j)^(1/2) / r_ij with one of them, for t = `lengths`.
-    """
+    the largest (t_i t_j)^(1/2) / r_ij with one of them, for t = `lengths`."""
     from scipy.spatial import cKDTree  # takes 0.1 s to import
 
     if len(points) < 2:
@@ -269,8 +259,7 @@ def overlaps(
     points: Array, lengths: Array, radii: Array
 ) -> tuple[tuple[Indices, Indices], Array, Array] | None:
     """All pairs i, j of asperities whose shells overlap, the entries S_ij, and the numbers
-    (t_i t_j)^(1/2) / r_ij; None if there may be too many pairs to store.
-    """
+    (t_i t_j)^(1/2) / r_ij; None if there may be too many pairs to store."""
     from scipy.spatial import cKDTree
 
     tree = cKDTree(points)

@@ -362,8 +362,7 @@ def _energy_error(found: Level, box: Box, start: Trial, moved: Array) -> float:
 
 def _other_solutions(level: Level, box: Box) -> tuple[bool, float, bool]:
     """False if there is no solution but that of `level`; and `Certificate`'s bound on the crowding
-    and statement on the cover of all others: docs/theory/crowded.md, "Other solutions".
-    """
+    and statement on the cover of all others: docs/theory/crowded.md, "Other solutions"."""
     none = False, np.inf, True
     if box.scope == "global":
         return none

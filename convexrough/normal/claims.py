@@ -129,8 +129,7 @@ class Claim(ABC):
 
     def hints(self) -> Iterator[str]:
         """Lines that name a possible cause of wrong forces, such as a wrong unit or sign; none if
-        the claim holds, also with the default of `within`.
-        """
+        the claim holds, also with the default of `within`."""
         if self.holds_by_default or (nearby := self.nearby()) is None:
             return
         values, true = (each / (self.largest or 1.0) for each in (self.values, nearby[0]))

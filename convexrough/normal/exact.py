@@ -30,8 +30,7 @@ INVERSE_PI = Fraction("0.3183098861837906715377675267450287240689192914809128974
 class Units:
     """Units of length and force in which the numbers of a problem are about 1: those of the scene
     times a power of two (length) and a power of eight (force). So scaling rounds neither float64
-    numbers nor forces to the power 2/3.
-    """
+    numbers nor forces to the power 2/3."""
 
     length: float  # [length] the scaled unit of length
     force: float  # [force] the scaled unit of force
@@ -44,8 +43,7 @@ class Units:
     @classmethod
     def of(cls, approach: float, coefficient: float) -> Units:
         """Units close to `approach` [length] and to the load k^(-3/2) approach^(3/2) of this
-        indentation, k = `coefficient`. Raises InputError unless approach is positive and finite.
-        """
+        indentation, k = `coefficient`. Raises InputError unless approach is positive and finite."""
         if not 0 < approach < math.inf:
             raise InputError("scene", found=f"indentations of {approach:g}", expected=checks.SIZED)
         length = 2.0 ** round(math.log2(approach))
@@ -106,8 +104,7 @@ def twofold_offsets(scene: Scene, which: Indices, units: Units, heights: Array) 
 @lru_cache
 def _constants(base: Radius, modulus: float, local: float, unit: float) -> tuple[Ball, Ball, Ball]:
     """Three balls: the mean curvature of the pressed body; and, scaled by `local` and `unit`, k^3
-    of an asperity whose relative curvature is 1, and 1 / (pi E*).
-    """
+    of an asperity whose relative curvature is 1, and 1 / (pi E*)."""
     curvature = sum((1 / (2 * Fraction(R)) for R in along(base) if math.inf > R), Fraction(0))
     cubed = Fraction(9, 16) * Fraction(local) ** 3 / Fraction(modulus) ** 2
     scale = INVERSE_PI / Fraction(modulus) * Fraction(unit)

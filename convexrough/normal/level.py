@@ -162,8 +162,7 @@ class Level:
 
     def moves(self, coupling: Coupling) -> Any:
         """(m,) bounds on |A P - A P*|, for the map A from loads to displacements at m points, the
-        loads P of `trial` and the solution P*.
-        """
+        loads P of `trial` and the solution P*."""
         if self.box is None or self.trial is None:
             return np.inf
         # `distance` is that of (1 + t) P, which has the total L; t P is bounded in the same norm.
@@ -315,8 +314,7 @@ def _bounded(
 
     def residual(others: float) -> tuple[Array, float, float]:
         """Bounds on the residual after the change, on s, and on the displacements by it and by
-        asperities without a proved status, whose |x| have the sum `others`.
-        """
+        asperities without a proved status, whose |x| have the sum `others`."""
         s = short + others
         moved = (s + others) * problem.largest_entry
         e = left.size + moved

@@ -134,8 +134,7 @@ def _key(load: Ball) -> tuple[float, float, float]:
 @np.errstate(all="ignore")
 def solved(stack: Stack, box: Box | None = None) -> tuple[Level, NDArray[np.bool_]]:
     """The solutions of all rows, and (m,) True where a row is proved in `box` (default: the
-    `widest`), with the status of every asperity, and its residual is near its rounding error.
-    """
+    `widest`), with the status of every asperity, and its residual is near its rounding error."""
     loads = pressed(stack)
     finite = np.where(np.isfinite(loads).all(axis=1, keepdims=True), loads, 0.0)
     state = refined_loads(stack, finite)

@@ -114,8 +114,7 @@ class NormalProblem:
 
     def at_load(self, load: Ball) -> Self:
         """The sharp problem of the same asperities under a total load, by which the approach must
-        be at most `approach_bound`.
-        """
+        be at most `approach_bound`."""
         return self._at(load, by_load=True)
 
     def sharpened(self) -> Self:
@@ -143,8 +142,7 @@ class NormalProblem:
     @cached_property
     def screened(self) -> Indices:
         """(m,) the indices of the asperities that cannot touch, as approach plus offset is at most
-        0 in every solution.
-        """
+        0 in every solution."""
         left = np.ones(len(self.scene), dtype=bool)
         left[self.candidates] = False
         return left.nonzero()[0]
@@ -202,8 +200,7 @@ class NormalProblem:
 
     def pressed_product(self, loads: Pair) -> Ball:
         """(n,) A P for loads P >= 0, precise enough for a press: unless the problem is `precise`,
-        fewer digits than `product` on a lattice and, for a matrix, where loads are 0.
-        """
+        fewer digits than `product` on a lattice and, for a matrix, where loads are 0."""
         if self.precise:
             return self.product(loads)
         if isinstance(self.influence, LatticeInfluence):
@@ -339,8 +336,7 @@ class NormalProblem:
 
     def bounds(self, approach_bound: float) -> Array:
         """(n,) upper bounds (max(D_i, 0) / k_i)^(3/2) on the loads of every solution, from an upper
-        bound on the approach D0 in D_i = D0 + d_i.
-        """
+        bound on the approach D0 in D_i = D0 + d_i."""
         rounding = self.offset_errors + 6 * ROUNDOFF * abs(approach_bound)
         alone: Array = hertz.load(approach_bound + self.offsets + rounding, self.coefficients)
         return alone * (1 + SAFETY)
@@ -352,8 +348,7 @@ class NormalProblem:
 
     def convexity_number(self, loads: Array) -> float:
         """The largest shells_i / h_i with the `compliance` h at `loads`; below 1 the energy is
-        convex for all loads from 0 up to `loads`: (3) of docs/theory/convexity.md.
-        """
+        convex for all loads from 0 up to `loads`: (3) of docs/theory/convexity.md."""
         return float(convexity_number(self.shells, self.compliance(loads)))
 
     def overhang(self, weights: Array, displacement: Ball) -> Any:

@@ -76,8 +76,7 @@ def proved(problem: NormalProblem, state: Trial, box: Box | None = None) -> Leve
 def solution_in(problem: NormalProblem, box: Box, state: Trial) -> tuple[Any, Array, Level]:
     """Three results on the solution near the trial loads: True if it is proved that the box
     contains the solution, (m,) for a stack (if False, the other two prove nothing); (n,) bounds on
-    the errors of the trial loads; and the level, by the theorem on a smaller box.
-    """
+    the errors of the trial loads; and the level, by the theorem on a smaller box."""
     trial, (extra, coupled, bent) = state.loads.high, _missing(problem, state)
     residual = np.where(box.fixed_open, 0.0, state.excess + bent)
 

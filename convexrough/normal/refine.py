@@ -241,8 +241,7 @@ def defect_of(state: Trial) -> Any:
 
 def rounding_of(state: Trial) -> Any:
     """The 2-norm of the residual's rounding errors, without those of positive gaps, which do not
-    change the residual: a number, or (m,) for a stack.
-    """
+    change the residual: a number, or (m,) for a stack."""
     counts = state.inside | (state.gap.value <= state.gap.radius)
     errors = np.where(counts, state.gap.radius, 0.0)
     return np.sqrt(np.einsum("...i,...i->...", errors, errors))

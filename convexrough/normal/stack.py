@@ -23,8 +23,7 @@ from convexrough.normal.problem import NormalProblem
 @dataclass(frozen=True, eq=False)
 class Stack(NormalProblem):
     """Problems in m rows: arrays are (m, n), or (n,) where all rows are equal. `restricted`,
-    `widened`, `approach_bound`, `places`, `to_scene` and `assemble` do not work.
-    """
+    `widened`, `approach_bound`, `places`, `to_scene` and `assemble` do not work."""
 
     #: slices of the rows, each with a problem that has the compliance operator of these rows; scene
     #: and units are those of the first problem

@@ -294,8 +294,7 @@ def _value(program: ConeProgram | QuadraticProgram, x: Array) -> float:
 def _bristle_error(rows: BristleProgram, own: Array) -> float:
     """Estimated error of the loads of the bristle program, divided by the largest load: at most
     0.375 B / m^2 for one asperity (docs/theory/bristles.md), times up to about 1 / lambda by
-    interaction, with the smallest of the `scaled_eigenvalues` as lambda.
-    """
+    interaction, with the smallest of the `scaled_eigenvalues` as lambda."""
     row = 0.375 * float(rows.box.max() / own.max()) / rows.m**2
     return row / float(scaled_eigenvalues(rows.problem, own)[0])
 

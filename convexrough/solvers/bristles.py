@@ -19,7 +19,6 @@ from convexrough.convex.definite import is_definite
 from convexrough.normal.law import on_hertz_pressure
 from convexrough.normal.problem import NormalProblem
 from convexrough.solvers.conic import TooDenseError
-from convexrough.solvers.newton import newton_step
 from convexrough.solvers.programs import ProgramAnswer, QuadraticProgram, RawAnswer, run_osqp
 from convexrough.solvers.solution import Solution
 from convexrough.sphere import hertz
@@ -44,7 +43,7 @@ class BristleQP:
 
     bristles    : m, number of cells in half a row, 0 <= x <= b_i; the error of the loads is about
         0.4 / m^2 of the largest load
-    newton_step : True to end with one Newton step, which squares the relative error
+    newton_step : True to end with Newton steps, each of which squares the relative error
     tolerance   : absolute and relative tolerance of OSQP, in scaled units. If OSQP finds which
         bristles carry forces (the active set), polishing computes these forces up to rounding
     max_iterations : largest number of iterations of OSQP
@@ -80,10 +79,8 @@ class BristleQP:
         program = BristleProgram.assemble(problem, self.bristles, self.name)
         loads, approach, iterations = program.invert(self.run(program.apply()))
         if self.newton_step:
-            last = newton_step(problem, loads)
-            loads, approach = last.loads, last.approach
-            iterations += last.iterations
-        return Solution.of(problem, loads, approach, iterations, refine=self.newton_step)
+            return Solution.refined(problem, loads, iterations, self.name)
+        return Solution.of(problem, loads, approach, iterations)
 
     def run(self, program: QuadraticProgram) -> RawAnswer:
         """The solution of the program by OSQP, not yet checked."""

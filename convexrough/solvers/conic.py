@@ -9,7 +9,7 @@ cut, and when five cones per asperity replace four, or the scene is refused.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,6 @@ from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.convex.cones import FIVE_CONES_LIMIT, FOUR_CONES_LIMIT, power_cones
 from convexrough.errors import InputError, SolverError
 from convexrough.normal.problem import NormalProblem
-from convexrough.solvers.newton import newton_step
 from convexrough.solvers.programs import ConeProgram, ProgramAnswer, RawAnswer, run_clarabel
 from convexrough.solvers.solution import Solution
 from convexrough.sphere import hertz
@@ -31,10 +30,6 @@ NEGLIGIBLE = 1e-12
 
 #: Contact radius at the upper end of a box, divided by that at the a priori bound on the load.
 WIDENED = 1.1
-
-#: With a Newton step: the largest accepted residual of the contact law (|gap| at loaded asperities,
-#: -gap at others), divided by |D0| + max |d_i|. If it is larger after one step, a second follows.
-ACCURATE = 1e-13
 
 #: Without a Newton step, max |P - P(D - A P)| / max P may be at most ROOTS times the square root of
 #: the tolerance, because an error of the energy causes errors of loads in proportion to its root.
@@ -122,12 +117,12 @@ class ConeSolver(ABC):
     """Base class of the solvers of the cone program. The class checks their answers.
 
     tolerance   : tolerance of the cone solver, in scaled units
-    newton_step : True to end with a step of Newton's method, which reduces errors of about 1e-8 of
-        the largest load to rounding errors; a second step follows if the first is too inaccurate
+    newton_step : True to end with steps of Newton's method, which reduce errors of about 1e-8 of
+        the largest load to rounding errors
 
     SolverError is raised if loads violate the contact law: with `newton_step` by more than
-    `ACCURATE`, without it by more than `ROOTS` allows. TooDenseError is raised if the cut boxes do
-    not contain the solution.
+    `solution.ACCURATE`, without it by more than `ROOTS` allows. TooDenseError is raised if the cut
+    boxes do not contain the solution.
     """
 
     tolerance: float = 1e-9
@@ -152,8 +147,7 @@ class ConeSolver(ABC):
 
     def solve(self, problem: NormalProblem, start: Array | None = None) -> Solution:
         """The solution in scaled units; `start` is not used. Raises SolverError and TooDenseError
-        if a check fails.
-        """
+        if a check fails."""
         try:
             return solve_in(self, problem, ConeBoxes.choose(problem))
         except TooDenseError:
@@ -194,12 +188,12 @@ def judged(
     alone = hertz.load(indentation, problem.coefficients)  # P(D - A P)
     loads = np.where(indentation > 0, loads, 0.0)
     if solver.newton_step:
-        step = _after_newton_step(solver, problem, loads, alone)
+        step = Solution.refined(problem, loads, answer.iterations, solver.name)
         theta = problem.shells / problem.compliance(step.loads)
         if (theta >= FIVE_CONES_LIMIT).any():
             beyond = np.where(theta < 1, 0.0, theta)[boxes.members]
             raise boxes.too_dense(problem, solver.name, beyond)
-        return replace(step, iterations=answer.iterations + step.iterations)
+        return step
     missed = float(np.abs(loads - alone).max() / max(loads.max(), np.finfo(float).tiny))
     if not missed <= (accepted := ROOTS * np.sqrt(solver.tolerance)):
         raise SolverError(
@@ -211,36 +205,13 @@ def judged(
     return Solution.of(problem, loads, approach, answer.iterations)
 
 
-def _after_newton_step(
-    solver: ConeSolver, problem: NormalProblem, loads: Array, alone: Array
-) -> Solution:
-    """The solution after one or two Newton steps from P = `loads` or, where the compliance exceeds
-    the sum of the row of A, from `alone`, Hertz's loads at the indentations D - A P: they are less
-    sensitive to errors of the loads there.
-    """
-    light = problem.compliance(loads) > problem.influence.apply(np.ones(len(problem)))
-    loads = np.where(light, alone, loads)
-    for steps in (1, 2):
-        step = newton_step(problem, loads)
-        missed = step.residual / (abs(step.approach) + float(np.abs(problem.offsets).max()))
-        if missed <= ACCURATE:
-            return replace(step, iterations=steps)
-        loads = step.loads
-    raise SolverError(
-        f"residual of {missed:.3g} of the approach after two Newton steps, accepted {ACCURATE:g}",
-        solver=solver.name,
-        advice="try more iterations, a smaller tolerance, or Newton's method",
-        iterate=loads,
-    )
-
-
 @dataclass(frozen=True)
 class Conic(ConeSolver):
     """A solver of the cone program (docs/theory/exact-cones.md) with Clarabel, an interior-point
     method.
 
     tolerance      : tolerance of the duality gap and of feasibility, in scaled units
-    newton_step    : True to end with one or two Newton steps
+    newton_step    : True to end with Newton steps
     max_iterations : largest number of iterations
 
     >>> contact = cr.press(scene, approach=5e-5, solver=cr.solvers.Conic())

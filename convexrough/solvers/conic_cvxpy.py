@@ -43,7 +43,7 @@ class ConicCVXPY(ConeSolver):
         `OPTIONS` does not name keep their own tolerances and limits
     solver         : a name from `cvxpy.installed_solvers()`, in upper or lower case
     verbose        : True to print the output of CVXPY and of the solver
-    newton_step    : True to end with one or two Newton steps
+    newton_step    : True to end with Newton steps
 
     >>> contact = cr.press(scene, approach=5e-5, solver=cr.solvers.ConicCVXPY())
     >>> contact.solver, contact.certificate.all_proved

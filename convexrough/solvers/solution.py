@@ -11,8 +11,12 @@ from numpy.typing import ArrayLike
 from convexrough.arrays import Array
 from convexrough.errors import SolverError
 from convexrough.normal.problem import NormalProblem
-from convexrough.normal.refine import Trial
+from convexrough.normal.refine import Trial, refined_loads
 from convexrough.record import Record
+
+#: Largest accepted residual of the contact law (|gap| at loaded asperities, -gap at others) after
+#: the Newton steps that follow a program, divided by |D0| + max |d_i|.
+ACCURATE = 1e-13
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -68,6 +72,26 @@ class Solution(Record):
         residual = problem.residual(loads, approach) if known else np.inf
         residual = np.inf if np.isnan(residual) else residual
         return cls(loads, approach, iterations, residual, refine)
+
+    @classmethod
+    def refined(
+        cls, problem: NormalProblem, loads: Array, iterations: int, solver: str
+    ) -> Solution:
+        """The solution by Newton steps from the loads (n,) >= 0 of another solver. Raises
+        SolverError if they leave a residual above `ACCURATE`.
+        """
+        state = refined_loads(problem, loads, problem.pressed_product)
+        approach, residual = float(state.approach.value), float(state.excess.max())
+        missed = residual / (abs(approach) + float(np.abs(problem.offsets).max()))
+        if not missed <= ACCURATE:
+            raise SolverError(
+                f"residual of {missed:.3g} of the approach after Newton steps, at most "
+                f"{ACCURATE:g} accepted",
+                solver=solver,
+                advice="try more iterations, a smaller tolerance, or Newton's method",
+                iterate=state.loads.high,
+            )
+        return cls(state.loads.high, approach, iterations, residual, True, state.frozen())
 
 
 class Solver(Protocol):
