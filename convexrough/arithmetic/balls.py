@@ -52,8 +52,11 @@ class Ball:
     __array_ufunc__ = None
 
     @classmethod
-    def exact(cls, value: Exact) -> Ball:
-        """Balls of numbers known exactly; the radius of a Fraction covers its rounding error."""
+    def exact(cls, value: Ball | Exact) -> Ball:
+        """Balls of numbers known exactly; the radius of a Fraction covers its rounding error. Balls
+        are returned unchanged."""
+        if isinstance(value, Ball):
+            return value
         if isinstance(value, Fraction):
             pair = Pair.nearest(value)
             return cls.around(pair, PAIR_ROUNDOFF * abs(pair.high) + TINY)
@@ -138,7 +141,7 @@ class Ball:
         return np.asarray(self.upper < 0)
 
     def __add__(self, other: Ball | Exact) -> Ball:
-        return elementwise(_sum, self, as_ball(other))
+        return elementwise(_sum, self, Ball.exact(other))
 
     __radd__ = __add__
 
@@ -146,21 +149,21 @@ class Ball:
         return Ball(-self.mid, self.radius)
 
     def __sub__(self, other: Ball | Exact) -> Ball:
-        return elementwise(_sum, self, -as_ball(other))
+        return elementwise(_sum, self, -Ball.exact(other))
 
     def __rsub__(self, other: Exact) -> Ball:
-        return as_ball(other) - self
+        return Ball.exact(other) - self
 
     def __mul__(self, other: Ball | Exact) -> Ball:
-        return elementwise(_product, self, as_ball(other))
+        return elementwise(_product, self, Ball.exact(other))
 
     __rmul__ = __mul__
 
     def __truediv__(self, other: Ball | Exact) -> Ball:
-        return elementwise(_quotient, self, as_ball(other))
+        return elementwise(_quotient, self, Ball.exact(other))
 
     def __rtruediv__(self, other: Exact) -> Ball:
-        return as_ball(other) / self
+        return Ball.exact(other) / self
 
     def scaled(self, unit: float) -> Ball:
         """The balls times a power of two, which is exact unless numbers underflow or overflow."""
@@ -218,11 +221,6 @@ def joined(balls: Sequence[Ball]) -> Ball:
     """The balls concatenated along the first axis."""
     joint: Ball = of_rows(lambda *each: np.concatenate(each), *balls)
     return joint
-
-
-def as_ball(value: Ball | Exact) -> Ball:
-    """Balls unchanged; exact numbers as by `Ball.exact`."""
-    return value if isinstance(value, Ball) else Ball.exact(value)
 
 
 @quietly

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from convexrough import threads
 from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.errors import SolverError
-from convexrough.influence.coupling import Influence, Smoother
+from convexrough.influence.coupling import Influence
 
 #: Largest number of touching asperities for which Cholesky's factorisation is cheapest, with and
 #: without a stored matrix. Heuristics, from timings.
@@ -37,9 +37,6 @@ SINGLE_LIMIT, DOUBLE_LIMIT = 2e-6, 1e-13
 #: Conjugate gradients also end if (r'M r)^(1/2), with the residual r and the preconditioner M, is
 #: below ENERGY times SINGLE_LIMIT or DOUBLE_LIMIT times its first value.
 ENERGY = 1e-2
-
-#: A step is made in two parts if TWICE times its tolerance is at most SINGLE_LIMIT.
-TWICE = 30.0
 
 MOST_ITERATIONS = 500
 
@@ -78,7 +75,7 @@ def correct(
             step = _factorise(influence, extra, touching, root, defect, balanced)
         else:
             with threads.one_thread() if not influence.stored else nullcontext():
-                step = _in_two_parts(influence, extra, root, defect, balanced, tolerance)
+                step = _iterate(influence, extra, root, defect, balanced, tolerance)
         if step is not None:
             return step
     raise SolverError("the matrix of a step is not positive definite", solver="newton")
@@ -115,41 +112,13 @@ def softness_of(slopes: Array) -> Array:
     return np.asarray(1.0 / np.maximum(slopes, LEAST_SLOPE))
 
 
-def _in_two_parts(
-    influence: Influence,
-    shells: Array | None,
-    root: Array,
-    defect: Array,
-    balanced: bool,
-    tolerance: float,
-) -> Array | None:
-    """The step by `_iterate`; in two parts only where single precision is not enough."""
-    smooth = influence.smoother(root)
-    step = _iterate(influence, smooth, shells, root, defect, balanced, tolerance)
-    if step is None or shells is not None or influence.stored or TWICE * tolerance > SINGLE_LIMIT:
-        return step
-    slopes = root**2
-    left, missing = defect + step + influence.apply(slopes * step), 0.0
-    if balanced:
-        left -= float(slopes @ left) / float(slopes.sum())  # beta
-        missing = -float(slopes @ step)
-    size = float(np.linalg.norm(defect))
-    if size == 0.0 or not left.any():
-        return step
-    share = float(np.linalg.norm(left)) / size
-    rest = _iterate(influence, smooth, None, root, left, balanced, tolerance / share, missing)
-    return None if rest is None else step + rest
-
-
 def _iterate(
     influence: Influence,
-    smooth: Smoother | None,
     shells: Array | None,
     root: Array,
     defect: Array,
     balanced: bool,
     tolerance: float,
-    total: float = 0.0,
 ) -> Array | None:
     """The step by preconditioned conjugate gradients (docs/theory/newton.md, "Many asperities");
     None if the matrix is not positive definite.
@@ -159,7 +128,7 @@ def _iterate(
     factor times the diagonal of W to the residual, so that single precision is enough. The sum of
     these factors is beta of the step, divided by the scale of the defect.
     """
-    single = not influence.stored
+    single, smooth = not influence.stored, influence.smoother(root)
     dtype: Any = np.float32 if single else np.float64
     limit = SINGLE_LIMIT if single else DOUBLE_LIMIT
     size = float(np.abs(defect).max()) or 1.0
@@ -185,9 +154,8 @@ def _iterate(
             z += dtype(off) * border
         return z, left, whole
 
-    y = dtype(total / (size * weight)) * border
-    y_displacement = influence.apply(w * y) if total else np.zeros_like(w)  # A W y
-    residual: Values = -w * ((defect / size).astype(dtype) + y_displacement) - diagonal * y
+    y_displacement = np.zeros_like(w)  # A W y
+    residual: Values = -w * (defect / size).astype(dtype)
     z, left, first = smoothed(residual)
     p = z.copy()
     squared = float(residual @ z)  # r' M r

@@ -115,10 +115,6 @@ class Blocks:
         total = self._sums(root * root)  # W^2 summed over each block
         touching = total > 0
         counts = self._sums(root > 0)[touching].astype(np.float64)
-        sharing = float(counts @ counts / counts.sum())
-        # Estimates A W r within a block of many asperities, for r with random signs.
-        within = np.sqrt(np.pi * sharing * np.log(max(0.5 * sharing / BLOCK**2, 1.0)))
-        rough = self.scale / BLOCK * within
 
         def average(waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
             waves[0] *= passed[:, each]
@@ -154,8 +150,7 @@ class Blocks:
             averages = field.take(block)
             averages *= q
             np.subtract(values, averages, out=averages)
-            inner = rough * np.linalg.norm(w * values) if rough else 0.0
-            return averages, float(np.hypot(np.sqrt(left.sum()), inner))
+            return averages, math.sqrt(left.sum())
 
         return smooth
 

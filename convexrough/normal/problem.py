@@ -285,7 +285,8 @@ class NormalProblem:
         top = float(prescribed.max(initial=0.0)) or 1.0
         if highest == np.inf:  # take the indentation of one asperity under the whole load
             top = float(hertz.indentation(given, coefficients.max()))
-        units = Units.of(top, _middle(coefficients))
+        some = np.sort(coefficients[:: max(1, len(coefficients) // 1000)])
+        units = Units.of(top, float(some[len(some) // 2]))
         about = _about(scene, candidates, taken(coefficients, candidates), units, influence)
         control = Ball.exact(given / (units.length if load is None else units.force))
         by_load, highest = load is not None, highest / units.length
@@ -389,9 +390,3 @@ def convexity_number(shells: Array, compliance: Array) -> Any:
 
 def _numbers(control: Ball) -> Any:
     return control.value if control.shape else float(control.value)
-
-
-def _middle(values: Array) -> float:
-    """The approximate median of the values, from fewer than 2000 of them."""
-    some = np.sort(values[:: max(1, len(values) // 1000)])
-    return float(some[len(some) // 2])
