@@ -62,7 +62,7 @@ def correct(
     defect    : (n,) F
     balanced  : True to keep the sum of the loads to first order
     tolerance : largest accepted 2-norm of F + J d, divided by that of F, with the Jacobian J; used
-        only by conjugate gradients
+        only by conjugate gradients, which reach SINGLE_LIMIT, or its square if not `balanced`
 
     Raises SolverError if rounding errors make the matrix indefinite even with the shells.
     """
@@ -76,6 +76,11 @@ def correct(
         else:
             with threads.one_thread() if not influence.stored else nullcontext():
                 step = _iterate(influence, extra, root, defect, balanced, tolerance)
+            more = tolerance < SINGLE_LIMIT and not balanced and not influence.stored
+            if more and step is not None and extra is None:  # for digits that float32 lacks
+                left = defect + step + influence.apply(root**2 * step)
+                rest = _iterate(influence, None, root, left, balanced, SINGLE_LIMIT)
+                step = None if rest is None else step + rest
         if step is not None:
             return step
     raise SolverError("the matrix of a step is not positive definite", solver="newton")

@@ -26,6 +26,7 @@ from convexrough.arithmetic.pairs import Pair, two_product
 from convexrough.arrays import Array
 from convexrough.bench.scenes import APPROACH
 from convexrough.bench.scenes import scene as bench_scene
+from convexrough.convex.newton_step import correct
 from convexrough.influence import couple, coupling, lattice, scattered
 from convexrough.influence.coupling import Coupling, Influence, JointCoupling, inverse_distances
 from convexrough.influence.dense import DenseInfluence
@@ -149,6 +150,17 @@ def test_bounds_in_single_precision_are_above_the_sums() -> None:
     exactly, _ = inverse_sums(A.points, A.points[[5]], load[[5]])
     exactly[5] = 0.0
     assert (A.falloff(load, 1) >= exactly).all()
+
+
+def test_steps_of_more_digits_than_single_precision_has() -> None:
+    scene = bench_scene("lattice", 9.0)
+    random = np.random.default_rng(1)
+    A = couple(scene, np.arange(len(scene)), SCALE)
+    c = random.uniform(0.02, 0.2, len(scene)) * scene.asperities.lattice.spacing / SCALE
+    defect = random.normal(size=len(scene))
+    step = correct(A, shells(A), np.sqrt(c), defect, balanced=False, tolerance=1e-10)
+    left = step + A.apply(c * step) + defect
+    assert np.linalg.norm(left) <= 1e-10 * np.linalg.norm(defect)
 
 
 def at_line(k: int, call: Callable[[], Any], other: Callable[[], Any]) -> tuple[Any, bool]:
