@@ -80,6 +80,8 @@ class Solution(Record):
         """The solution by Newton steps from the loads (n,) >= 0 of another solver. Raises
         SolverError if they leave a residual above `ACCURATE`.
         """
+        if not loads.any():  # all below the tolerance of the solver
+            loads = np.ones(len(loads))
         state = refined_loads(problem, loads, problem.pressed_product)
         approach, residual = float(state.approach.value), float(state.excess.max())
         missed = residual / (abs(approach) + float(np.abs(problem.offsets).max()))

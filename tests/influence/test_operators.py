@@ -9,7 +9,6 @@ from fractions import Fraction
 from functools import partial
 from types import FrameType
 from typing import Any
-from unittest.mock import Mock
 
 import multiprecision
 import numpy as np
@@ -511,13 +510,3 @@ def test_presses_of_points_in_distant_clusters() -> None:
     for points in (np.vstack((patch, patch + far)), np.vstack((patch, far))):
         scene = scenes.on_sphere(points, 10.0, radius=np.inf)
         assert cr.press(scene, approach=0.02, influence="scattered").iterations <= 8
-
-
-def test_an_interrupted_mesh_is_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Else the operator would fall back to a matrix, which may not fit in memory."""
-    operator = ScatteredInfluence(scenes.jittered(np.random.default_rng(2)), SCALE)
-    with monkeypatch.context() as patch:
-        patch.setattr(Product, "assemble", Mock(side_effect=KeyboardInterrupt))
-        with pytest.raises(KeyboardInterrupt):
-            operator.apply(np.ones(len(operator)))
-    assert operator._double is not None

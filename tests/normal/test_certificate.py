@@ -21,7 +21,6 @@ from convexrough.contact import levels_of
 from convexrough.convex.definite import proved_sparse_margin
 from convexrough.influence.coupling import Kind, inverse_distances
 from convexrough.influence.dense import DenseInfluence
-from convexrough.normal import certificate
 from convexrough.normal.boxes import (
     CROWDED_MARGINS,
     MARGINS,
@@ -512,21 +511,6 @@ def test_negative_rates_are_no_weights(monkeypatch: pytest.MonkeyPatch) -> None:
     loaded = contact.loads[problem.candidates] > 0
     assert (seen[0] >= 0).all()
     assert (seen[0][loaded] == 0).any()
-
-
-def test_other_solutions_are_excluded_by_the_bound_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where no matrix is stored, rates are used only if an exact bound would be enough."""
-    found = []
-    for seed in range(60):
-        scene, approach = scenes.scattered(seed, 60, 1.1, 0.5)
-        load = cr.press(scene, approach=approach).load
-        each = [cr.press(scene, load=load, influence="scattered").certificate.scope]
-        with monkeypatch.context() as without:
-            without.setattr(certificate, "highest_by_rates", lambda *_: 1e3)
-            each.append(cr.press(scene, load=load, influence="scattered").certificate.scope)
-        found.append(tuple(each))
-    assert ("global", "local") in found
-    assert ("local", "global") not in found
 
 
 @pytest.mark.parametrize("make", [scenes.scattered, scenes.on_lattice])
