@@ -38,6 +38,10 @@ SINGLE_LIMIT, DOUBLE_LIMIT = 2e-6, 1e-13
 #: below ENERGY times SINGLE_LIMIT or DOUBLE_LIMIT times its first value.
 ENERGY = 1e-2
 
+#: Steps that need not keep a total are made twice if TWICE times their tolerance is below
+#: SINGLE_LIMIT.
+TWICE = 30.0
+
 MOST_ITERATIONS = 500
 
 #: Smaller slopes dP/d(delta), in scaled units, count as 0.
@@ -76,10 +80,11 @@ def correct(
         else:
             with threads.one_thread() if not influence.stored else nullcontext():
                 step = _iterate(influence, extra, root, defect, balanced, tolerance)
-            more = tolerance < SINGLE_LIMIT and not balanced and not influence.stored
+            more = TWICE * tolerance < SINGLE_LIMIT and not balanced and not influence.stored
             if more and step is not None and extra is None:  # for digits that float32 lacks
                 left = defect + step + influence.apply(root**2 * step)
-                rest = _iterate(influence, None, root, left, balanced, SINGLE_LIMIT)
+                share = float(np.linalg.norm(left) / np.linalg.norm(defect)) or 1.0
+                rest = _iterate(influence, None, root, left, balanced, tolerance / share)
                 step = None if rest is None else step + rest
         if step is not None:
             return step

@@ -196,31 +196,26 @@ class DirectCoupling(Coupling):
         return self._sums(strengths, power) * (1.0 + 1.01 * loss)
 
     def _sums(self, values: Array, power: int) -> Array:
-        total = np.zeros(len(self.targets))
-        for rows, columns, inverse in self._blocks():
-            total[rows] += (inverse if power == 1 else inverse**power) @ values[columns]
-        return total
+        blocks = (each if power == 1 else each**power for each in self._blocks())
+        return np.concatenate([each @ values for each in blocks])
 
     @cached_property
     def _whole(self) -> Array:
         return inverse_distances(self.targets, self.points)
 
-    def _blocks(self) -> Iterator[tuple[slice, slice, Array]]:
-        """Blocks of the matrix 1 / r with their rows and columns; a small matrix is one block."""
+    def _blocks(self) -> Iterator[Array]:
+        """Blocks of rows of the matrix 1 / r; a small matrix is one block."""
         if len(self.points) * len(self.targets) <= KEPT:
-            yield slice(None), slice(None), self._whole
-            return
-        for rows in _rows(len(self.targets), len(self.points)):
-            for columns in threads.chunks(len(self.points), ENTRIES):
-                inverse = inverse_distances(self.targets[rows], self.points[columns])
-                yield rows, columns, inverse
+            yield self._whole
+        else:
+            for rows in _rows(len(self.targets), len(self.points)):
+                yield inverse_distances(self.targets[rows], self.points)
 
     @cached_property
     def _entry_error(self) -> float:
         if self.point_error == 0:
             return entry_error(0.0, np.inf)
-        largest = [float(inverse.max(initial=0.0)) for _, _, inverse in self._blocks()]
-        closest = max(largest, default=0.0)
+        closest = max(float(inverse.max(initial=0.0)) for inverse in self._blocks())
         return entry_error(self.point_error, 1.0 / closest if closest > 0 else np.inf)
 
 

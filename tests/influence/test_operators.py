@@ -246,7 +246,7 @@ def test_slopes_on_lattices_that_are_made(family: str, most: float) -> None:
         assert errors.max() <= most * (A.scale * A.falloff(np.abs(load), 2)).max()
 
 
-def test_direct_sums_over_blocks_of_columns(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_direct_sums_in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(coupling, "KEPT", 0)
     monkeypatch.setattr(coupling, "ENTRIES", 16)
     rng = np.random.default_rng(0)
