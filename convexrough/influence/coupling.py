@@ -239,14 +239,6 @@ class JointCoupling(Coupling):
         return np.concatenate((np.zeros(self.targets, dtype=values.dtype), values))
 
 
-def error_reach(coupling: Coupling, scale: float, variances: Array) -> Array:
-    """(m,) bounds on the square root of sum_j A_ij^2 v_j for v = `variances`.
-
-    They bound |A e|_i for every error e of the loads with sum_j e_j^2 / v_j <= 1.
-    """
-    return scale * np.sqrt(coupling.falloff(variances, 2))
-
-
 def known(points: Array, tails: Array | None, point_error: float) -> tuple[Pair, float]:
     """The points (n, 2) as double-double numbers, and a bound on the errors of their coordinates.
 

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from convexrough import checks
 from convexrough.arithmetic.balls import Ball
 from convexrough.arrays import Array, Indices, frozen
-from convexrough.influence import Kind
+from convexrough.influence import Kind, couple
 from convexrough.normal.boxes import Box, Scope, highest_by_rates
 from convexrough.normal.level import Level
 from convexrough.normal.problem import ALL_SHARP, NormalProblem
@@ -27,6 +27,7 @@ from convexrough.normal.refine import Trial, refined, trial_of
 from convexrough.record import Along, Proved
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.scene import Scene
+from convexrough.sphere import hertz
 
 #: Statuses by their codes.
 STATUSES = np.array(["undecided", "contact", "open"])
@@ -65,8 +66,9 @@ class Certificate(Proved):
     duality_gap : [force length] upper bound on the energy of these loads minus that of the
         solution, which has the least energy if the scope is "global". The bound is infinite if
         nothing is proved, if the energy is not proved convex between the loads and the solution,
-        and if asperities that cannot touch, or that the proof fixes open, have loads. If the total
-        load is prescribed, the energy is that of the loads scaled to the total
+        and if asperities that the proof fixes open have loads. If the total load is prescribed, the
+        energy is that of the loads scaled to the total, and the bound is infinite if asperities
+        that cannot touch have loads
     fixed_open : number of asperities that the proof assumes to be open, and then proves to be open
         in the solution that it finds. Where this is not 0 (crowded contacts), nearby solutions in
         which one of these asperities touches are not excluded
@@ -261,8 +263,7 @@ def certificate_of(level: Level, loads: Array, start: Trial) -> Certificate:
     codes = depths.codes()
     codes[problem.candidates[level.touching]] = TOUCHING
     codes[problem.candidates[level.open]] = OPEN
-    if np.count_nonzero(loads) > np.count_nonzero(loads[problem.candidates]):
-        energy = np.inf  # loads on asperities that cannot touch
+    energy += _screened_energy(depths, loads)
     return Certificate(
         scope="local" if possible else "global",
         convexity_number=box.convexity_number,
@@ -358,6 +359,32 @@ def _energy_error(found: Level, box: Box, start: Trial, moved: Array) -> float:
     missing = float(start.missing.size * max(found.approach.size, start.approach.size))
     excess = np.where(box.fixed_open, 0.0, excess)
     return (float(excess @ moved) + missing) * (1 + SAFETY + len(moved) * ROUNDOFF)
+
+
+def _screened_energy(depths: Depths, loads: Array) -> float:
+    """Bound on sum (3/5) k s^(5/3) + g's + s'A s / 2, the energy of loads s on asperities that
+    cannot touch, with their gaps g; infinite if there are such loads under load control.
+    """
+    problem, screened = depths.problem, loads > 0
+    screened[problem.candidates] = False
+    which = np.flatnonzero(screened)
+    if len(which) == 0:
+        return 0.0
+    if problem.load is not None:  # these loads change the scaling of the others
+        return np.inf
+    # Loads that underflow in scaled units count as the smallest positive number.
+    s = np.maximum(loads[which] / problem.units.force, checks.SMALLEST)
+    modulus, radii = problem.scene.material.contact_modulus, problem.scene.relative_radii[which]
+    coefficients = hertz.local_coefficient(modulus, radii)
+    coupling = couple(problem.scene, which, problem.influence.scale, None)
+    moved = coupling.apply(s)
+    moved += coupling.rounding(s).of(moved)
+    local = 0.6 * hertz.indentation(s, coefficients * problem.units.local)
+    indentation, errors = (each[screened[problem.screened]] for each in depths.of_screened())
+    energy = float(s @ (local + (errors - indentation) + 0.5 * np.maximum(moved, 0.0))) * (
+        1 + SAFETY
+    )
+    return max(energy, checks.SMALLEST)
 
 
 def _other_solutions(level: Level, box: Box) -> tuple[bool, float, bool]:

@@ -27,7 +27,6 @@ from convexrough.arrays import Array, Indices, among_zeros, summed
 from convexrough.convex.newton_step import correct
 from convexrough.convex.theorem import distance, excess
 from convexrough.errors import ProofError, SolverError
-from convexrough.influence.coupling import Coupling, error_reach
 from convexrough.normal.boxes import Box
 from convexrough.normal.problem import REDUCTION, NormalProblem
 from convexrough.normal.refine import CORRECTIONS, ENOUGH, Trial
@@ -159,18 +158,6 @@ class Level:
         load = self.load if self.load.radius.ndim == 1 else self.load[:, 0]
         known = self.loads, self.indentation, self.touching, self.open
         return Rows(load, self.approach[:, 0], *known)
-
-    def moves(self, coupling: Coupling) -> Any:
-        """(m,) bounds on |A P - A P*|, for the map A from loads to displacements at m points, the
-        loads P of `trial` and the solution P*."""
-        if self.box is None or self.trial is None:
-            return np.inf
-        # `distance` is that of (1 + t) P, which has the total L; t P is bounded in the same norm.
-        P, inside = self.trial.loads.high, self.trial.inside
-        t = self.trial.missing.size / (summed(P) or 1.0) * (1 + SAFETY)
-        moved = t * np.sqrt(self.compliance[inside] @ P[inside] ** 2) * (1 + SAFETY)
-        reach = error_reach(coupling, self.problem.influence.scale, 1.0 / self.compliance)
-        return (self.distance + moved) * reach * (1 + SAFETY)
 
     @cached_property
     def energy(self) -> Ball:

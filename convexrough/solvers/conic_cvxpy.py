@@ -33,6 +33,11 @@ OPTIONS = {
 }
 
 
+#: Package names, for `pip`, of CVXPY's solvers with second-order cones.
+PACKAGES = {name: name.lower() for name in (*OPTIONS, "CVXOPT", "CPLEX")}
+PACKAGES |= {"MOSEK": "Mosek", "GUROBI": "gurobipy", "COPT": "coptpy"}
+
+
 @dataclass(frozen=True)
 class ConicCVXPY(ConeSolver):
     """A solver of the cone program through CVXPY, with any of its second-order cone solvers.
@@ -94,22 +99,32 @@ class ConicCVXPY(ConeSolver):
                 warnings.filterwarnings("ignore", message="Solution may be inaccurate")
                 program.solve(solver=self.solver, verbose=self.verbose, **options)
         except cp.error.SolverError as error:
-            from cvxpy.reductions.solvers.defines import SOLVER_MAP_CONIC as KNOWN
-
-            able = [name for name in KNOWN if cp.SOC in KNOWN[name].SUPPORTED_CONSTRAINTS]
-            installed = [name for name in cp.installed_solvers() if name in able]
-            what = str(error)
-            if self.solver not in installed:
-                what = f"{self.solver} is not installed, or has no second-order cones"
-                advice = checks.nearest(self.solver, installed)
-                if self.solver in able:
-                    choice = f"choose one of {', '.join(installed)}"
-                    advice = f"pip install {self.solver.lower()}, or {choice}"
+            what, advice = _missing(cp, self.solver) or (str(error), advice)
             raise SolverError(what, solver=self.name, advice=advice) from error
         if program.status not in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
             what = f"{self.solver.lower()} stopped with {program.status}"
             raise SolverError(what, solver=self.name, advice=advice)
         return program
+
+
+def _missing(cp: Any, solver: str) -> tuple[str, str] | None:
+    """The reason why CVXPY cannot use this solver, and advice; None if CVXPY can use it."""
+    from cvxpy.reductions.solvers import defines  # the cones that each solver accepts
+
+    conic = defines.SOLVER_MAP_CONIC
+    able = [name for name in conic if cp.SOC in conic[name].SUPPORTED_CONSTRAINTS]
+    installed = [name for name in cp.installed_solvers() if name in able]
+    if solver in installed:
+        return None
+    choice = f"choose one of {', '.join(installed)}"
+    if solver in able:
+        package = PACKAGES.get(solver)
+        get = f"pip install {package}" if package else "install it as its documentation says"
+        what = f"{solver} is not installed; CVXPY finds {', '.join(installed)}"
+        return what, f"{get}, or {choice}"
+    if solver in conic or solver in defines.SOLVER_MAP_QP:
+        return f"{solver} has no second-order cones", f"{choice}, or solvers.BristleQP()"
+    return f"CVXPY has no solver {solver}", checks.nearest(solver, installed)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

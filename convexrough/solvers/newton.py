@@ -213,20 +213,6 @@ def _roughness(problem: NormalProblem) -> float:
     return float((heights - means[ring]).std())
 
 
-def newton_step(problem: NormalProblem, loads: Array) -> Solution:
-    """The result of one Newton step from the loads (n,) >= 0 of another solver, in scaled units.
-
-    A small relative error e of the loads becomes about e^2, and open asperities get the load 0.
-    """
-    law = Pressing(problem, float(np.abs(problem.offsets).max()))
-    before = law.evaluate(_start(problem, loads))
-    assert before is not None  # an asperity is loaded at the start
-    state = newton.descend(law, before, law.direction(before, 0.0))
-    approach = float(state.at.approach)
-    residual = problem.residual(state.forces, approach, state.at.displacement)
-    return Solution(state.forces, approach, 1, residual, refine=True)
-
-
 def _start(problem: NormalProblem, loads: Array | None) -> Array:
     """(n,) initial indentations: by Hertz's law where `loads` are positive, and -1 elsewhere.
 

@@ -384,6 +384,14 @@ def test_a_stored_matrix_of_many_rows_decides_what_grazes() -> None:
         assert pressed(heights).status[which] == status
 
 
+@pytest.mark.parametrize("load", [1e-320, 5e-324])
+def test_the_duality_gap_of_loads_that_underflow(load: float) -> None:
+    """The solution carries nothing and has no energy; these loads have some."""
+    scene = on_sphere([[0.0, 0.0], [0.01, 0.0]], heights=-1e-8)
+    gap = cr.certify(scene, [load, 0.0], approach=5e-9).duality_gap
+    assert Fraction(gap) >= Fraction(5e-9) * Fraction(load)
+
+
 @pytest.mark.parametrize("load", [1e-310, 5e-324])
 def test_bounds_of_the_smallest_loads_on_a_lattice(load: float) -> None:
     scene, given = paper(), np.full(61, load)

@@ -21,6 +21,7 @@ from convexrough.contact import levels_of
 from convexrough.convex.definite import proved_sparse_margin
 from convexrough.influence.coupling import Kind, inverse_distances
 from convexrough.influence.dense import DenseInfluence
+from convexrough.normal import certificate
 from convexrough.normal.boxes import (
     CROWDED_MARGINS,
     MARGINS,
@@ -248,6 +249,17 @@ def test_the_duality_gap_is_that_of_float64_loads(control: str, off: float) -> N
         assert certificate.duality_gap <= 3 * above
 
 
+@pytest.mark.parametrize("size", [1e-18, 1e-13, 1e-9])
+def test_the_duality_gap_counts_loads_on_screened_asperities(size: float) -> None:
+    scene, approach = scenes.NAMED["rough"]
+    contact, exact = (f(scene, approach=approach) for f in (cr.press, scenes.reference))
+    wrong = contact.loads.copy()
+    wrong[np.argmax(scene.asperities.distances)] += size * contact.load
+    above = excess(scene, wrong, exact)
+    gap = cr.certify(scene, wrong, approach=approach).duality_gap
+    assert 0 < above <= gap <= 1.01 * above + contact.certificate.duality_gap
+
+
 @pytest.mark.parametrize("factor", [3.0, 1e25])
 def test_loads_far_too_large_under_load_control(factor: float) -> None:
     """Scaled to the total they are right; as they are, they are off by all but a little."""
@@ -271,12 +283,14 @@ def test_a_load_too_small_for_own_units_is_not_lost(control: str) -> None:
 
 
 def test_the_energy_of_loads_where_nothing_can_touch() -> None:
+    """It is known at a prescribed approach; under a prescribed load it changes the scaling."""
     scene = scenes.paper()
     contact = cr.press(scene, load=1e-8)
     assert 60 not in NormalProblem.assemble(scene, load=1e-8).candidates
     loads = contact.loads.copy()
     loads[60] = 1e-3 * loads.max()
-    assert cr.certify(scene, loads, approach=contact.approach).duality_gap == np.inf
+    at_approach = cr.certify(scene, loads, approach=contact.approach)
+    assert 0 < at_approach.duality_gap < np.inf
     assert cr.certify(scene, loads * (1e-8 / loads.sum()), load=1e-8).duality_gap == np.inf
     assert cr.certify(scene, contact.loads, load=1e-8).duality_gap < 1e-20
 
@@ -511,6 +525,21 @@ def test_negative_rates_are_no_weights(monkeypatch: pytest.MonkeyPatch) -> None:
     loaded = contact.loads[problem.candidates] > 0
     assert (seen[0] >= 0).all()
     assert (seen[0][loaded] == 0).any()
+
+
+def test_other_solutions_are_excluded_by_the_bound_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where no matrix is stored, rates are used only if an exact bound would be enough."""
+    found = []
+    for seed in range(60):
+        scene, approach = scenes.scattered(seed, 60, 1.1, 0.5)
+        load = cr.press(scene, approach=approach).load
+        each = [cr.press(scene, load=load, influence="scattered").certificate.scope]
+        with monkeypatch.context() as without:
+            without.setattr(certificate, "highest_by_rates", lambda *_: 1e3)
+            each.append(cr.press(scene, load=load, influence="scattered").certificate.scope)
+        found.append(tuple(each))
+    assert ("global", "local") in found
+    assert ("local", "global") not in found
 
 
 @pytest.mark.parametrize("make", [scenes.scattered, scenes.on_lattice])
