@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from convexrough import threads
 from convexrough.arrays import Array, Indices, among_zeros
 from convexrough.errors import SolverError
-from convexrough.influence.coupling import Influence
+from convexrough.influence.coupling import Influence, Smoother
 
 #: Largest number of touching asperities for which Cholesky's factorisation is cheapest, with and
 #: without a stored matrix. Heuristics, from timings.
@@ -38,8 +38,7 @@ SINGLE_LIMIT, DOUBLE_LIMIT = 2e-6, 1e-13
 #: below ENERGY times SINGLE_LIMIT or DOUBLE_LIMIT times its first value.
 ENERGY = 1e-2
 
-#: Steps that need not keep a total are made twice if TWICE times their tolerance is below
-#: SINGLE_LIMIT.
+#: A step is made in two parts if TWICE times its tolerance is at most SINGLE_LIMIT.
 TWICE = 30.0
 
 MOST_ITERATIONS = 500
@@ -66,7 +65,7 @@ def correct(
     defect    : (n,) F
     balanced  : True to keep the sum of the loads to first order
     tolerance : largest accepted 2-norm of F + J d, divided by that of F, with the Jacobian J; used
-        only by conjugate gradients, which reach SINGLE_LIMIT, or its square if not `balanced`
+        only by conjugate gradients
 
     Raises SolverError if rounding errors make the matrix indefinite even with the shells.
     """
@@ -79,13 +78,7 @@ def correct(
             step = _factorise(influence, extra, touching, root, defect, balanced)
         else:
             with threads.one_thread() if not influence.stored else nullcontext():
-                step = _iterate(influence, extra, root, defect, balanced, tolerance)
-            more = TWICE * tolerance < SINGLE_LIMIT and not balanced and not influence.stored
-            if more and step is not None and extra is None:  # for digits that float32 lacks
-                left = defect + step + influence.apply(root**2 * step)
-                share = float(np.linalg.norm(left) / np.linalg.norm(defect)) or 1.0
-                rest = _iterate(influence, None, root, left, balanced, tolerance / share)
-                step = None if rest is None else step + rest
+                step = _in_two_parts(influence, extra, root, defect, balanced, tolerance)
         if step is not None:
             return step
     raise SolverError("the matrix of a step is not positive definite", solver="newton")
@@ -122,13 +115,41 @@ def softness_of(slopes: Array) -> Array:
     return np.asarray(1.0 / np.maximum(slopes, LEAST_SLOPE))
 
 
-def _iterate(
+def _in_two_parts(
     influence: Influence,
     shells: Array | None,
     root: Array,
     defect: Array,
     balanced: bool,
     tolerance: float,
+) -> Array | None:
+    """The step by `_iterate`; in two parts only where single precision is not enough."""
+    smooth = influence.smoother(root)
+    step = _iterate(influence, smooth, shells, root, defect, balanced, tolerance)
+    if step is None or shells is not None or influence.stored or TWICE * tolerance > SINGLE_LIMIT:
+        return step
+    slopes = root**2
+    left, missing = defect + step + influence.apply(slopes * step), 0.0
+    if balanced:
+        left -= float(slopes @ left) / float(slopes.sum())  # beta
+        missing = -float(slopes @ step)
+    size = float(np.linalg.norm(defect))
+    if size == 0.0 or not left.any():
+        return step
+    share = float(np.linalg.norm(left)) / size
+    rest = _iterate(influence, smooth, None, root, left, balanced, tolerance / share, missing)
+    return None if rest is None else step + rest
+
+
+def _iterate(
+    influence: Influence,
+    smooth: Smoother | None,
+    shells: Array | None,
+    root: Array,
+    defect: Array,
+    balanced: bool,
+    tolerance: float,
+    total: float = 0.0,
 ) -> Array | None:
     """The step by preconditioned conjugate gradients (docs/theory/newton.md, "Many asperities");
     None if the matrix is not positive definite.
@@ -138,7 +159,7 @@ def _iterate(
     factor times the diagonal of W to the residual, so that single precision is enough. The sum of
     these factors is beta of the step, divided by the scale of the defect.
     """
-    single, smooth = not influence.stored, influence.smoother(root)
+    single = not influence.stored
     dtype: Any = np.float32 if single else np.float64
     limit = SINGLE_LIMIT if single else DOUBLE_LIMIT
     size = float(np.abs(defect).max()) or 1.0
@@ -150,7 +171,8 @@ def _iterate(
 
     def smoothed(residual: Values) -> tuple[Values, float, float]:
         """M r for the residual r, projected; the 2-norm of A W r; and r' M r without projection.
-        If balanced, `residual` is changed in place."""
+        If balanced, `residual` is changed in place.
+        """
         nonlocal beta
         if smooth:
             z, left = smooth(residual)
@@ -164,8 +186,9 @@ def _iterate(
             z += dtype(off) * border
         return z, left, whole
 
-    y_displacement = np.zeros_like(w)  # A W y
-    residual: Values = -w * (defect / size).astype(dtype)
+    y = dtype(total / (size * weight)) * border
+    y_displacement = influence.apply(w * y) if total else np.zeros_like(w)  # A W y
+    residual: Values = -w * ((defect / size).astype(dtype) + y_displacement) - diagonal * y
     z, left, first = smoothed(residual)
     p = z.copy()
     squared = float(residual @ z)  # r' M r

@@ -45,7 +45,7 @@ FIT_FROM, FITTED = 0.8, 0.9
 
 #: Margins mu with which a Cholesky factorisation is tried; and those on a box of touching
 #: asperities, where the energy may be barely convex.
-MARGINS, CROWDED_MARGINS = (1e-3, 0.1), tuple((1e-4 * 2.0 ** np.arange(12)).tolist())
+MARGINS, CROWDED_MARGINS = (0.1, 1e-3), tuple((1e-4 * 2.0 ** np.arange(12)).tolist())
 
 #: The upper ends of a box of touching asperities exceed each load by at least LEEWAY times the load
 #: plus LEAST_LEEWAY times the largest load.
@@ -132,8 +132,9 @@ def tried(problem: NormalProblem, loads: Array, displacement: Ball) -> Box | Non
         if problem.by_load:
             box = widest(problem, loads, highest_by_rates(problem, loads))
         if not box.convexity_number < 1:
-            margin = convex_margin(problem.influence, box.compliance, MARGINS)
-            box = box._replace(convexity_number=1.0 - margin)
+            given = problem.influence, box.compliance
+            found = (convex_margin(*given, (mu,)) for mu in MARGINS)
+            box = box._replace(convexity_number=1.0 - next(filter(None, found), 0.0))
     if box.convexity_number < 1:
         return box
     shells, h = problem.shells, problem.compliance(loads)

@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from convexrough.arithmetic.balls import Ball, where
+from convexrough.arithmetic.balls import Ball, elementwise, of_rows, where
+from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, summed
 from convexrough.convex.theorem import distance
 from convexrough.normal.boxes import Box, box_of_touching, crowded, tried
@@ -96,10 +97,8 @@ def solution_in(problem: NormalProblem, box: Box, state: Trial) -> tuple[Any, Ar
     indentation = Ball.around(known.mid, known.radius + (moved + shift))
     opened = indentation.negative
     loads = Ball.around(state.loads, np.where(opened, state.loads.high, errors))  # open: 0
-    if (loads.radius > POOR * loads.mid.high).any():  # (n / k)^(3/2) may be a smaller ball
-        ratio = indentation / problem.exact.coefficients
-        by_law = ratio.positive_part() * ratio.sqrt()
-        loads = where(by_law.radius < loads.radius, by_law, loads)
+    if (loads.radius > POOR * loads.mid.high).any():
+        loads = elementwise(_or_by_law, loads, indentation, problem.exact.coefficients)
     approach = Ball.around(state.approach.mid, shift)
     found = Level(problem, loads, indentation, approach, opened, state, box, within, h)
     return inside, at_first, found
@@ -121,6 +120,26 @@ def _missing(problem: NormalProblem, state: Trial) -> tuple[Any, Any, Any]:
     found = part * loads, part * coupled, part * rest
     extra, coupled, bent = (np.where(part <= 0.5, each, np.inf) for each in found)
     return extra, coupled, bent
+
+
+def _or_by_law(P: Pair, dP: Array, n: Pair, dn: Array, k: Pair, dk: Array) -> tuple[Pair, Array]:
+    """The balls of loads P, or of (n / k)^(3/2) where P is inexact and this ball is smaller.
+
+    n : the indentations;  dP, dn, dk : radii of the balls
+    """
+    # Where n is known well, the ball of (n / k)^(3/2) has a radius of about 1.5 P dn / n.
+    hopeless = (n.high > 2.0 * dn) & (1.5 * P.high * dn > dP * n.high)
+    which = ((dP > POOR * P.high) & ~hopeless).nonzero()
+
+    def some(ball: Ball) -> Ball:
+        found: Ball = of_rows(lambda part: np.broadcast_to(part, dP.shape)[which], ball)
+        return found
+
+    ratio, found = some(Ball(n, dn)) / some(Ball(k, dk)), of_rows(np.copy, Ball(P, dP))
+    by_law = ratio.positive_part() * ratio.sqrt()
+    best = where(by_law.radius < dP[which], by_law, some(found))
+    found.mid.high[which], found.mid.low[which], found.radius[which] = *best.mid, best.radius
+    return found.mid, found.radius
 
 
 def _approach_error(
