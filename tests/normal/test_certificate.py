@@ -180,7 +180,7 @@ def test_the_convex_margin_is_a_lower_bound(seed: int, size: float) -> None:
     problem = NormalProblem.assemble(scene, approach=1e-4)
     h = problem.compliance(problem.bounds(problem.approach_bound) * size)
     hessian = problem.influence.matrix / np.sqrt(h) / np.sqrt(h)[:, None] + np.eye(12)
-    margin = convex_margin(problem.influence, h, MARGINS)
+    margin = convex_margin(problem.influence, h, sorted(MARGINS))
     smallest = np.linalg.eigvalsh(hessian)[0]
     assert margin <= max(smallest, 0.0)
     assert margin > 0 or smallest < 1.1e-3
@@ -189,7 +189,7 @@ def test_the_convex_margin_is_a_lower_bound(seed: int, size: float) -> None:
 @pytest.mark.sample(5)
 @pytest.mark.parametrize("seed", range(40))
 def test_gaps_of_screened_neighbours_that_nearly_coincide(seed: int) -> None:
-    """Where contact points are rounded, so is their distance, to whom it may concern."""
+    """Where contact points are rounded, so is their distance."""
     rng, tips = np.random.default_rng(seed), np.array([1e-3, 1e-4])
     first = rng.uniform(-1, 1, 2)
     points = np.array([first, first + 10.0 ** rng.uniform(-11, -2) * rng.normal(size=2)])
