@@ -211,7 +211,7 @@ def test_theorem_3() -> None:
         A = DenseInfluence.assemble(points, 1.0).matrix
         c = random.uniform(0.1, 0.6, n) / A.max(axis=1)
         c[s:] = 0.0
-        bounds = order.rates_from(c[:s], A[:, :s], 1e-15)
+        bounds = order.rates_from(c[None, :s], A[None, :, :s], np.full((1, 1), 1e-15))[0]
         if (bounds[:s] > 0).all():
             found += 1
             for share in (1.0, *random.random((3, n)), *random.random((3, n)).round()):
