@@ -125,7 +125,7 @@ def _mark_points(axes: Axes, x: Array, y: Array) -> None:
 def _maps(path: LoadPath, scale: Scale) -> Figure:
     """Maps of stick and slip at some points, all in the same square, with P and Q as titles."""
     chosen = evenly_chosen(range(len(path.loads)), MOST_MAPS)
-    figure, places = tiles(len(chosen), 2)
+    figure, places = tiles(len(chosen), 3)
     scene, modulus = path.scene, path.scene.material.contact_modulus
     radii = hertz.contact_radius(path.asperity_loads, modulus, scene.relative_radii)
     room = radii[chosen].max(axis=0)
@@ -135,9 +135,9 @@ def _maps(path: LoadPath, scale: Scale) -> Figure:
         draw_statuses(axes, scale.points, scale.length, path.status[k], radii[k], room=room)
         slide = np.count_nonzero(path.status[k] == "sliding")
         touch = np.count_nonzero(path.asperity_loads[k] > 0)
-        forces = f"$P$ = {unit.of(path.loads[k]):.3g}, $Q$ = {unit.of(path.forces[k]):.3g} {named}"
-        said = f"{k + 1}: {forces}\n{slide:,} of {touch:,} slide".replace("-", "\u2212")
-        style.title(axes, said, "center")
+        load, force = (f"{unit.of(each[k]):.3g} {named}" for each in (path.loads, path.forces))
+        said = f"{k + 1}: $P$ = {load}\n$Q$ = {force}\n{slide:,} of {touch:,} slide"
+        style.title(axes, said.replace("-", "\u2212"), "center")
     x = scale.length.label("x") + (f"    (${unit.symbol}$ = {unit.said})" if unit.symbol else "")
     label_tiles(figure, places, x, scale.length.short("y"))
     name_statuses(figure, path.status[chosen], "outside upper center")

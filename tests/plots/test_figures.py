@@ -191,7 +191,7 @@ def test_the_path_and_its_memory_are_drawn() -> None:
     place = figures["path_stick_slip"].axes[3]
     assert discs(place, "sliding") == int((path.status[3] == "sliding").sum())
     said = [text.get_text() for text in texts(figures["path_stick_slip"])]
-    assert "4: $P$ = 1, $Q$ = \u22120.075 $P_m$\n6 of 37 slide" in said
+    assert "4: $P$ = 1 $P_m$\n$Q$ = \u22120.075 $P_m$\n6 of 37 slide" in said
     assert [text.count("P_m$ = ") for text in said if text.startswith("$x")] == [1]
     assert said.count("\u22121") == 2 + 4
 
