@@ -157,7 +157,9 @@ class Contact(Cached, Table, Plottable):
             force = getattr(state, "force", None)
             if getattr(state, "contact", self) is not self or not isinstance(force, int | float):
                 expected = "a shear state of this contact, a result of `shear`"
-                raise InputError(f"sheared[{k}]", found=checks.shown(state), expected=expected)
+                other = isinstance(force, int | float)
+                found = "a state of another contact" if other else checks.shown(state)
+                raise InputError(f"sheared[{k}]", found=found, expected=expected)
             drop = abs(Fraction(force)) / Fraction(checks.friction(self.scene.friction))
             if drop == 0 or drop >= (1 - AT_THE_END * Fraction(ROUNDOFF)) * Fraction(self.load):
                 found = f"the shear force {force:.17g}"

@@ -65,10 +65,9 @@ class Certificate(Proved):
     approach_error : [length] bound on |approach - approach of the solution|; 0 if prescribed
     duality_gap : [force length] upper bound on the energy of these loads minus that of the
         solution, which has the least energy if the scope is "global". The bound is infinite if
-        nothing is proved, if the energy is not proved convex between the loads and the solution,
-        and if asperities that the proof fixes open have loads. If the total load is prescribed, the
-        energy is that of the loads scaled to the total, and the bound is infinite if asperities
-        that cannot touch have loads
+        nothing is proved, or if the energy is not proved convex between the loads and the solution.
+        If the total load is prescribed, the energy is that of the loads scaled to the total, and
+        the bound is infinite if asperities that cannot touch have loads
     fixed_open : number of asperities that the proof assumes to be open, and then proves to be open
         in the solution that it finds. Where this is not 0 (crowded contacts), nearby solutions in
         which one of these asperities touches are not excluded
@@ -341,15 +340,18 @@ def _energy_error(found: Level, box: Box, start: Trial, moved: Array) -> float:
     """Bound on Phi(P) - Phi(P*), the energy of the loads P minus that of the solution P*.
 
     It is e'|P - P*| with the violations e of the contact law at P and |P - P*| <= `moved`, if Phi
-    is proved convex between P and P*, and no asperity that is fixed open has a load; else infinite.
+    is proved convex between P and P*; else infinite. Loads q on asperities fixed open add at most
+    e'q; without them, the residuals of the others are lower by A q.
     """
     problem, loads, excess = found.problem, start.loads.high, start.excess
     if start is found.trial:  # P: these loads, rounded and perhaps rescaled to the total
         excess = excess + 2 * ROUNDOFF * (start.local + start.product.size)
         moved = moved + ROUNDOFF * loads
     most = np.maximum(loads * (1 + SAFETY), box.loads)
-    if (box.fixed_open & (loads > 0)).any():
-        return np.inf
+    excess = np.where(box.fixed_open & (loads == 0), 0.0, excess)
+    if (q := np.where(box.fixed_open, most, 0.0)).any():
+        displacement, most = problem.influence.apply(q), most - q
+        excess = excess + displacement + problem.influence.rounding(q).of(displacement)
     if (most > box.loads).any():  # on the box A >= -theta H, theta = box.convexity_number
         # Up to `most`, H is at least cbrt(part) times its value at the upper ends of the box.
         part = np.divide(box.loads, most, out=np.ones(len(most)), where=most > 0).min()
@@ -357,7 +359,6 @@ def _energy_error(found: Level, box: Box, start: Trial, moved: Array) -> float:
         if not (convex or box.convexity_at(problem.compliance(most)) < 1):
             return np.inf
     missing = float(start.missing.size * max(found.approach.size, start.approach.size))
-    excess = np.where(box.fixed_open, 0.0, excess)
     return (float(excess @ moved) + missing) * (1 + SAFETY + len(moved) * ROUNDOFF)
 
 

@@ -307,6 +307,7 @@ def random_points(seed: int, count: int, size: float = 1.0) -> cr.Scene:
 @settings(max_examples=40, deadline=None)
 @example(234, 2, 2.0, "dense", -11.0)  # a load just beyond the box where the energy is convex
 @example(350, 10, 2.0, "dense", -3.0)  # asperities that are fixed open, and loads on them
+@example(350, 10, 2.0, "dense", -11.0)
 @given(
     st.integers(0, 2**32 - 1),
     st.integers(2, 20),
@@ -338,8 +339,7 @@ def test_random_points_are_judged_honestly(
         assert_honest(judged, wrong, exact)
         if "approach" in control:
             assert excess(scene, wrong, exact) <= judged.duality_gap
-            known = digits > -10 or judged.duality_gap < 1e-9 * 5e-5 * contact.load
-            assert known or (judged.duality_gap == np.inf and judged.fixed_open)
+            assert digits > -10 or judged.duality_gap < 1e-9 * 5e-5 * contact.load
 
 
 @pytest.mark.sample(1)
