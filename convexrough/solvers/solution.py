@@ -18,6 +18,10 @@ from convexrough.record import Record
 #: the Newton steps that follow a program, divided by |D0| + max |d_i|.
 ACCURATE = 1e-13
 
+#: These steps may change a load by CORRECTED times the largest load, plus TINY in scaled units, as
+#: some solvers find loads to an absolute tolerance only.
+CORRECTED, TINY = 0.05, 1e-4
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Solution(Record):
@@ -78,11 +82,11 @@ class Solution(Record):
         cls, problem: NormalProblem, loads: Array, iterations: int, solver: str
     ) -> Solution:
         """The solution by Newton steps from the loads (n,) >= 0 of another solver. Raises
-        SolverError if they leave a residual above `ACCURATE`.
+        SolverError if they leave a residual above `ACCURATE`, or change the loads by more than
+        `CORRECTED` allows: else any answer would be right.
         """
-        if not loads.any():  # all below the tolerance of the solver
-            loads = np.ones(len(loads))
-        state = refined_loads(problem, loads, problem.pressed_product)
+        start = loads if loads.any() else np.ones(len(loads))
+        state = refined_loads(problem, start, problem.pressed_product)
         approach, residual = float(state.approach.value), float(state.excess.max())
         missed = residual / (abs(approach) + float(np.abs(problem.offsets).max()))
         if not missed <= ACCURATE:
@@ -93,7 +97,17 @@ class Solution(Record):
                 advice="try more iterations, a smaller tolerance, or Newton's method",
                 iterate=state.loads.high,
             )
-        return cls(state.loads.high, approach, iterations, residual, True, state.frozen())
+        found = state.loads.high
+        changed, largest = float(np.abs(found - loads).max()), float(found.max())
+        if not changed <= CORRECTED * largest + TINY:
+            raise SolverError(
+                f"Newton steps changed loads by {changed / largest:.3g} of the largest, at most "
+                f"{CORRECTED:g} accepted",
+                solver=solver,
+                advice="try more iterations, a smaller tolerance, or Newton's method",
+                iterate=loads,
+            )
+        return cls(found, approach, iterations, residual, True, state.frozen())
 
 
 class Solver(Protocol):
