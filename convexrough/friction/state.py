@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -48,24 +48,26 @@ class LevelSums(NamedTuple):
 
     used: list[Fraction]  # the k total loads of the levels of all curves, sorted
     places: Indices  # (m, j) the levels of each curve, as indices into `used`
-    weights: list[Ball]  # j times (m,): slope below minus slope above; 0 beyond a curve's levels
+    weights: Ball  # (m, j) slope below minus slope above; 0 beyond a curve's levels
 
     @classmethod
     def of(cls, curves: Sequence[MemoryCurve]) -> LevelSums:
         bends = [[(load, bend) for load, bend in curve.bends if bend] for curve in curves]
         used = sorted({load for each in bends for load, _ in each} or {curves[0].load})
-        place, wide = {load: k for k, load in enumerate(used)}, max(map(len, bends), default=0)
-        padded = [[*each, *[(used[0], Fraction(0))] * (wide - len(each))] for each in bends]
-        places = np.array([[place[load] for load, _ in each] for each in padded], dtype=np.intp)
-        columns = [exactly([each[k][1] for each in padded]) for k in range(wide)]
-        return cls(used, places, columns)
+        place, flat = {load: k for k, load in enumerate(used)}, [*chain(*bends)]
+        counts = np.array([[len(each)] for each in bends])
+        filled = np.arange(counts.max(initial=0)) < counts
+        at = np.where(filled, filled.cumsum().reshape(filled.shape), 0)
+        places = np.array([0, *(place[load] for load, _ in flat)])[at]
+        weights = exactly([Fraction(0), *(bend for _, bend in flat)])[at]
+        return cls(used, places, weights)
 
     def total(self, values: Ball) -> Ball:
         """(m, ...) for each curve the weighted sum of values (k, ...) at the levels `used`."""
         wide = (slice(None),) + (None,) * (len(values.shape) - 1)
         total = Ball.exact(np.zeros((len(self.places), *values.shape[1:])))
-        for weight, places in zip(self.weights, self.places.T, strict=True):
-            total = total + weight[wide] * values[places]
+        for j in range(self.places.shape[1]):
+            total = total + self.weights[:, j][wide] * values[self.places[:, j]]
         return total
 
 
