@@ -111,7 +111,7 @@ def read(
                 grid = map_arrays.instrument_map(path)
         stated = (pixel is not None or grid.pixel) and (height_unit or grid.height_unit)
         if grid.comments and not stated:
-            expected = "comments of Gwyddion or of an ESRI grid alone, or also --pixel and "
+            expected = "no such line, as it could state sizes or units, or also --pixel and "
             expected += "--height-unit, or names of columns as z [nm]"
             raise InputError("comments", found=shortened(grid.comments[0]), expected=expected)
         length = one_unit("unit", unit, grid.unit)

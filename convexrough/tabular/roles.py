@@ -41,7 +41,8 @@ INDEX = ("index", "asperity", "id", "no", "nr", "#", "i", "number", "node", "lab
 
 #: First words, in lower case, of rows that summarise a table and are not part of it.
 TOTALS = ("sum", "total", "totals", "grand total", "summe", "gesamt", "somme", "suma",
-          "mean", "average", "max", "min", "maximum", "minimum")  # fmt: skip
+          "mean", "mittelwert", "average", "median", "std", "max", "min", "maximum",
+          "minimum")  # fmt: skip
 
 
 def is_index(header: str) -> bool:

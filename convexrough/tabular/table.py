@@ -94,11 +94,11 @@ def read_table(
     missing = [name for name in required if name not in places]
     measured = (name for name in optional if COLUMNS[name].kind and name not in places)
     mistakes += _unnamed(source, places, missing, [*missing, *measured], instead, how)
-    titled = not source.rows and len(source.mistakes) > 0
-    if not source.rows and not mistakes and not titled:
+    if not source.rows and not mistakes and not source.mistakes:
         mistakes = ["rows: found none below the header, expected at least one"]
     if missing or not source.rows:
-        refuse(path, mistakes if titled and mistakes else [*mistakes, *source.mistakes])
+        several = len(source.mistakes) > len(source.rows) and mistakes
+        refuse(path, [*mistakes, *source.mistakes[: 1 if several else None]])
     names = source.header or [str(i + 1) for i in range(len(source.columns))]
     units = {name: found for name, place in places.items() if (found := unit(names[place]))}
     factors, wrong = roles.factors_of([name for name in places if COLUMNS[name].kind], units, how)
@@ -149,17 +149,20 @@ def _unnamed(
     others = [name for name in left if not is_index(name) and len(name) < 40]
     similar = roles.lookalikes(left, wanted)
     key = roles.columns_key({**how.columns, **similar}, missing)
-    key = f", or {key}" if how.keyed and source.header else ""
+    titled = len(source.mistakes) > len(source.rows)  # a line above the names counts as header
+    key = f", or {key}" if how.keyed and source.header and not titled else ""
     for name in (name for name in missing if name not in how.columns):
         advice = ": rename one" if source.header else ": add a first row with names"
+        if not source.style.decimal:
+            advice = ": save vectors with these names"
         if how.scalable:
             other = quote(others[0]) if len(others) == 1 == len(missing) else "NAME"
             other = other if source.header else "NUMBER"
             advice = f"; --column {name}={other} names another"
             if instead and {"x", "y"} <= places.keys():
                 advice += f", --column {instead[0]}={other} that of pixels"
-        if source.header and not source.rows and source.mistakes:
-            advice = "; begin lines above the names of columns with #"
+        if source.header and titled:
+            advice = "; remove the lines above the names of columns, or begin them with #"
         yield f"columns: found {_named(source)}, expected a column {name!r}{advice}{key}"
     for each, name in similar.items():
         meant = f'did you mean "{each}"{key}?'
@@ -253,8 +256,11 @@ def _numbers(
         try:
             if (number := style.number(cell)) is not None:
                 check(place, number)  # raises the error
-            comma = style.number(str(cell).replace(",", ".", 1)) is not None
-            expected = "a decimal point and no thousands separators" if comma else "a finite number"
+            mark = "comma" if style.decimal == "," else "point"
+            expected = f"a decimal {mark} and no thousands separators"
+            expected = expected if style.marked(str(cell)) else "a finite number"
+            if parsed(said := str(cell).strip("[]()")):
+                expected += f"; units belong into the header, as {name} [{said}]"
             raise InputError(place, found=shortened(repr(cell)), expected=expected)
         except InputError as error:
             mistakes.append(_shown(str(error), source.lines[i]))

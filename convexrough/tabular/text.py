@@ -46,6 +46,8 @@ HOLES = ("", "bad", "nan", "na", "n/a", "#n/a", "#nv", "none", "null", "---", "*
 _COMMENT = re.compile(r"%|#(?!N/A|NV\b|\S*[!?]|##+[,;\t])", re.I)
 
 _NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]([+-]?\d+)|([+-]\d{3}))?")
+#: Marks between digits that may separate thousands.
+_MARKS = re.compile(r"(?<=\d)[.,'\u2019\xa0\u202f](?=\d)")
 #: What instruments write for a hole. Spaces may separate columns, so this is replaced.
 _NO_DATA = re.compile(r"\bno data\b", re.I)
 _SURROGATE = re.compile("[\udc80-\udcff]")
@@ -106,6 +108,10 @@ class Style(NamedTuple):
             mantissa, exponent, bare = found.groups()  # Fortran writes 1.0-105 for 1.0D-105
             return float(f"{mantissa}e{exponent or bare or 0}")
         return float(text) if text.lower().lstrip("+-") in ("nan", "inf", "infinity") else None
+
+    def marked(self, cell: str) -> bool:
+        """True for a number that may have thousands separators or another decimal mark."""
+        return self.number(_MARKS.sub("", cell)) is not None
 
     def numbers(self, cells: Sequence[Any]) -> Array | None:
         """The numbers in cells; None if any cell is not a number."""
@@ -189,7 +195,8 @@ def read_cells(path: Path, known: Sequence[str] = (), *, is_map: bool = False) -
                 raise InputError(f"row {row.number}", found=shortened(row.text), expected=expected)
         comments += [row.text for row in rows[:start] if any(row.cells)]
         rows = rows[start:]
-    header = None if _numeric(rows[0].cells, style) else _names(rows[0].text, style)
+    is_header = not _numeric(rows[0].cells, style) and not all(map(style.marked, rows[0].cells))
+    header = _names(rows[0].text, style) if is_header else None
     rows = rows[1:] if header else rows
     if comments and not header:
         last = comments[-1].lstrip("#% ").rstrip(",;\t ")
@@ -198,7 +205,7 @@ def read_cells(path: Path, known: Sequence[str] = (), *, is_map: bool = False) -
             if 2 * wanted >= min(len(names), 4) and len(names) == _width(rows[0].cells):
                 header = [name.strip(",;") for name in names]
         comments = comments[:-1] if header else comments
-    if is_map and not header:
+    if is_map and not header and _width(rows[0].cells) != 3:  # else a list
         _refuse_gaps([row.number for row in rows])
     return _by_column(header, rows, style, comments)
 
@@ -305,7 +312,7 @@ def _sniffed(lines: Sequence[str], styles: Sequence[Style]) -> Style:
         widths = [*map(_width, rows)]
         width, _ = Counter(widths[1:] or widths).most_common(1)[0]
         cells = [cell for row in rows[1:] or rows for cell in row if cell]
-        numbers = sum(style.number(cell) is not None for cell in cells)
+        numbers = sum((style.number(cell) is not None) + style.marked(cell) for cell in cells) / 2
         doubtful = style.decimal == "," in lines[0] and not _numeric(rows[0], style)
         equal = widths.count(width) / len(rows)
         return equal * numbers / max(1, len(cells)) * (0.5 if doubtful else 1.0)

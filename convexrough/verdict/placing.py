@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from convexrough import checks
 from convexrough.arrays import Array, Indices
 from convexrough.contact import discs_of
 from convexrough.errors import InputError
@@ -147,10 +148,14 @@ class Placing:
         """(m,) the asperity of each row, from an index; None if rows are in the scene's order."""
         held, found = self.table.others, dict[str, Indices]()
         sure = ["index"] if "index" in self.table.called else SURELY_INDEX
+        indexed = any(bare(name).lower() in sure for name in held)
         for name, cells in held.items():
             if bare(name).lower() in sure:
                 found |= self._indices(name, cells)
-            elif is_index(name) and cells.dtype.kind == "f" and (np.diff(cells) < 0).any():
+            elif is_index(name) or not indexed:
+                falls = cells.dtype.kind == "f" and (np.diff(cells) < 0).any()
+                if not (falls if is_index(name) else checks.is_permuted(cells)):
+                    continue
                 found_it = f"column {name or '1'}: found {cells[0]:g}, {cells[1]:g}, ..."
                 right = f"increasing numbers, or --column index={quote(name or '1')}"
                 self.mistakes.append(f"{found_it}, expected {right}")
@@ -170,14 +175,16 @@ class Placing:
     def _indices(self, name: str, cells: NDArray[Any]) -> dict[str, Indices]:
         """The index (m,) from 0 in a column that counts from 0 or 1; {} with a mistake if wrong."""
         rows, count = self.table.rows, len(self.scene)
-        whole = np.zeros(len(cells), dtype=bool)
-        if cells.dtype.kind == "f":
+        if cells.dtype.kind != "f":
+            whole = np.array([str(cell).isdecimal() for cell in cells])
+            whole &= not whole.all()  # texts in a file of arrays
+        else:
             whole = (np.floor(cells) == cells) & (cells >= 0) & (cells <= count)
         values, times = np.unique(cells, return_counts=True)
         if not whole.all():
             first = int(np.argmin(whole))
-            wrong = f"{cells[first]:g} in" if cells.dtype.kind == "f" else f"{cells[first]} in"
-            wrong += f" {rows[first]}, expected whole numbers up to {count}, from 0 or 1"
+            wrong = f"{cells[first]:g}" if cells.dtype.kind == "f" else repr(str(cells[first]))
+            wrong += f" in {rows[first]}, expected whole numbers up to {count}, from 0 or 1"
         elif times.max() > 1:
             twice = cells == values[times.argmax()]
             where = " and ".join(rows[i] for i in np.flatnonzero(twice)[:2])

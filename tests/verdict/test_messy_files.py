@@ -131,6 +131,7 @@ def shuffled(case: Case, start: int = 0, name: str = "index") -> dict[str, Any]:
 
 #: What a file holds; its name, if not loads.csv; and the options it is read with, if any.
 READ: dict[str, tuple[Any, ...]] = {
+    "an index and ranks": (lambda case: shuffled(case) | {"rank": np.arange(COUNT)[::-1]},),
     "gzip of German": (lambda case: german(case.table()), "a.csv.gz"),
     "MATLAB's matrix": (lambda case: {"result": matrix(case.table())}, "a.mat"),
     "MATLAB's structure": (lambda case: {"result": case.table()}, "a.mat"),
@@ -183,16 +184,18 @@ READ: dict[str, tuple[Any, ...]] = {
 REFUSED: dict[str, tuple[Any, ...]] = {
     "units below the header": (
         lambda case: lines(case.table()).replace("load\n", "load\nm,m,N\n", 1), "",
-        "row 2, column load: found 'N', expected a finite number: m,m,N"),
+        "row 2, column load: found 'N', expected a finite number; units belong into the header, as "
+        "load [N]: m,m,N"),
     **{f"a comment, {said!r}": (
         lambda case, said=said: f"{said}\n" + lines(case.table()), "",
         f"comments: found {said!r}, expected units in the header, as load [N], or no such comments")
        for said in ("# loads in mN", "% run 7", "# loads * 1e3")},
     "a title": (lambda case: "Run 7\n\n" + lines(case.table()), "",
-                "columns: found Run 7, expected a column 'load'; begin lines above the names of "),
+                "columns: found Run 7, expected a column 'load'; remove the lines above the names ",
+                "row 3: found 3 cells, expected 1, as in the header: x,y,load"),
     "a title in a workbook": (
         lambda case: [[["Run 7"], [], *cells(case.table())]], "a.xlsx",
-        "columns: found Run 7 in sheet \"Sheet\", expected a column 'load'; begin lines above"),
+        "columns: found Run 7 in sheet \"Sheet\", expected a column 'load'; remove the lines"),
     "a comment behind the names": (
         lambda case: lines(case.table()).replace("load\n", "load # kN\n", 1), "",
         "columns: found x, y, load # kN, expected a column 'load'"),
@@ -225,6 +228,9 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "decimal commas between commas": (
         lambda case: lines(case.table(), ",", ","), "",
         "row 2: found 6 cells, expected 3, as in the header"),
+    "separators of thousands": (
+        lambda case: "x;y;load\n" + 9 * "0,5;1,5;1.234,5\n", "",
+        "row 2, column load: found '1.234,5', expected a decimal comma and no thousands sep"),
     "rounded places": (
         lambda case: case.table(x=np.round(PLACES[case.order, 0], 5)), "",
         "if they are rounded: --tolerance "),
@@ -264,6 +270,12 @@ REFUSED: dict[str, tuple[Any, ...]] = {
                              "--scale: found area=-2, pressure=3, expected a column that is read"),
     "a factor of loads, of pixels": (Case.pixels, "a.csv --scale load=0.5",
                                      "--scale: found load=0.5, expected a column that is read: x"),
+    "an index of another name": (lambda case: shuffled(case, 1, "Knoten"), "",
+                                 "column Knoten: found ", "--column index=Knoten"),
+    "a sum below an index without a number": (lambda case: lines(shuffled(case)) + ",1.5\n", "",
+                                 "column index: found '' in row 14, expected whole numbers"),
+    "a matrix without names": (lambda case: matrix(shuffled(case)), "a.npy",
+                               "no header, 2 columns, expected a column 'load'"),
     "an index beyond the largest integers": (
         lambda _: {"index": [1e19, 2], "load": [1, 2]}, "", "column index: found 1e+19 in row 2"),
     "MATLAB's HDF5": (lambda _: b"MATLAB 7.3 MAT-file".ljust(128) + b"\x89HDF\r\n", "a.mat",
@@ -315,8 +327,8 @@ def test_refused_with_the_cause(case: Case, name: str) -> None:
     outcome = case.verify(make(case), *options, name=file)
     assert (outcome.status, outcome.out) == (2, "")
     assert all(cause in outcome.err for cause in causes), outcome.err
-    several = name in ("a row twice", "decimal commas between commas") or " index " in name
-    several |= name.startswith(("an index", "units below"))
+    several = name in ("a row twice", "decimal commas between commas") or " index" in name
+    several |= name.startswith(("an index", "units below", "a title", "separators"))
     assert len(outcome.err.splitlines()) <= (11 if several else 1)
 
 

@@ -217,7 +217,7 @@ def test_loads_at_a_slightly_different_place(tmp_path: Path) -> None:
         ('"x" "load"\n"1" 0 1.5\n"2" 1 0\n', "row 2: found 3 cells, expected 2, as in the header"),
         ("node,load\n103,1\n101,1\n102,1\n", "column node: found 103, 101, ..., expected increas"),
         ("index,load\n1,1\n0.5,1\n2,1\n", "column index: found 0.5 in row 3, expected whole numb"),
-        ("asperity,load\na1,1\na0,1\na2,1\n", "column asperity: found a1 in row 2, expected whole"),
+        ("asperity,load\na1,1\na0,1\na2,1\n", "column asperity: found 'a1' in row 2, expected w"),
         ("x_pos,y_pos,load\n0,0,1\n1,0,1\n2,0,1\n", "expected --column x=x_pos --column y=y_pos"),
         (b"PK\x03\x04...", "not text: an archive or an Excel workbook; name it .xlsx"),
         (b"MATLAB 5.0 MAT-file", "not text: a MAT-file; name it .mat"),
@@ -312,10 +312,19 @@ WRONG_SUMMITS = [
     *((f"{each}\n,,height,tip_radius\n0,0,1,2\n", said)
       for each, said in (("x,y,Summit,", "row 2: found 4 cells, expected 3, as in the header"),
                          ("X-Koordinate,Y-Koordinate,Summit,", "expected a column 'x'"))),
-    *((f"# {each}\nx,y,z\n0,0,1\n", f"found '# {each}', expected units in the header, as x [UNIT]")
-      for each in ("heights x 1000", "run 7")),
+    *((f"x,y,z\n0,1,2\n{each},1,2\n", f'found a row of "{each}", expected none: remove it')
+      for each in ("Mittelwert", "std")),
     ("x [mil],y [mil],radius [inch]\n0,0,1\n", "column tip_radius: found inch, expected mil, as x"),
 ]  # fmt: skip
+
+
+def test_comments_above_summits_could_state_a_unit(tmp_path: Path) -> None:
+    """They are an error only if the scene names units and the header does not."""
+    path, named = tmp_path / "summits.csv", Reading(units=UnitNames("m", "N"))
+    path.write_text("# heights x 1000\nx,y,z\n0,0,1\n")
+    assert len(read_summits(path, tip_radius=1.0, how=KEYED)) == 1
+    with pytest.raises(cr.ConvexroughError, match=r"heights x 1000', expected units .*, as x .m."):
+        read_summits(path, tip_radius=1.0, how=named)
 
 
 @pytest.mark.sample(8)
