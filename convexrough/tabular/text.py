@@ -111,7 +111,7 @@ class Style(NamedTuple):
 
     def marked(self, cell: str) -> bool:
         """True for a number that may have thousands separators or another decimal mark."""
-        return self.number(_MARKS.sub("", cell)) is not None
+        return len(cell) < LONGEST_NUMBER and self.number(_MARKS.sub("", cell)) is not None
 
     def numbers(self, cells: Sequence[Any]) -> Array | None:
         """The numbers in cells; None if any cell is not a number."""
@@ -312,7 +312,9 @@ def _sniffed(lines: Sequence[str], styles: Sequence[Style]) -> Style:
         widths = [*map(_width, rows)]
         width, _ = Counter(widths[1:] or widths).most_common(1)[0]
         cells = [cell for row in rows[1:] or rows for cell in row if cell]
-        numbers = sum((style.number(cell) is not None) + style.marked(cell) for cell in cells) / 2
+        numbers = sum(
+            0.5 * style.marked(cell) if style.number(cell) is None else 1.0 for cell in cells
+        )
         doubtful = style.decimal == "," in lines[0] and not _numeric(rows[0], style)
         equal = widths.count(width) / len(rows)
         return equal * numbers / max(1, len(cells)) * (0.5 if doubtful else 1.0)

@@ -602,6 +602,9 @@ def test_findings_as_junit(case: Case) -> None:
     options = "--shear=q.xml", "--shear-force", "0", "--junit", "q.xml", "--force"
     assert case.verify({"load": case.loads}, *options).refuses("q.xml: an input")
     assert Path("q.xml").read_text() == "force\n0\n"
+    outcome = case.verify({"load": case.loads}, "--junit", "summits.csv", "--force")
+    assert outcome.refuses("--junit: found summits.csv, expected the name of an .xml file")
+    assert Path("summits.csv").exists()
 
 
 def test_bytes_of_every_kind_end_in_a_reason(case: Case) -> None:
