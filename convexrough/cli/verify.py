@@ -119,8 +119,8 @@ def verify(
         raise click.UsageError("--shear and --shear-force go together.")
     if explain and (output.out or junit or output.proof):
         raise click.UsageError("--explain checks nothing: leave out --out, --junit and --proof.")
-    if junit and junit.suffix.lower() != ".xml":  # not, say, the scene's table of asperities
-        raise InputError("--junit", found=str(junit), expected="the name of an .xml file")
+    if junit and junit.suffix.lower() != ".xml":  # with --force it could be a table of the scene
+        raise FileError(f"--junit {junit}: expected a name that ends in .xml")
     alone = [Path("proof.json")] if output.proof and output.out is None else []
     for each in [*alone, *([junit] if junit else [])]:
         if each.resolve() in {it.resolve() for it in (scene, loads, shear) if it}:

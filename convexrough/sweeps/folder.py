@@ -155,7 +155,7 @@ def make_folder(path: Path, manifest: Mapping[str, Any], *, overwrite: bool = Fa
             write_text(path / MANIFEST, to_json(manifest) + "\n")
         (path / PARTS).mkdir(exist_ok=True)
         folder = folder_of(path, manifest)
-        for file in (path / PARTS).glob("*-????????????.parquet*"):
+        for file in (path / PARTS).glob("*-????????????.parquet*") if overwrite and there else ():
             of_another = folder.ending not in file.name
             if of_another and file.suffix in (".parquet", ".unfinished"):
                 file.unlink(missing_ok=True)

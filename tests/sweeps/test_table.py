@@ -328,6 +328,15 @@ def test_a_folder_of_another_sweep_is_refused(folder: Path) -> None:
     assert kept.exists()
 
 
+def test_parts_without_a_manifest_stay(folder: Path) -> None:
+    """A sweep that is not told to overwrite removes nothing."""
+    (folder / "manifest.json").unlink()
+    before = {path.name for path in (folder / "parts").iterdir()}
+    table = swept(tables(sweep={"seeds": 1}), out=folder)
+    assert table.complete
+    assert before < {path.name for path in (folder / "parts").iterdir()}
+
+
 def test_nothing_of_a_folder_that_is_no_sweep_is_removed(tmp_path: Path) -> None:
     (tmp_path / "manifest.json").write_text("{}")
     with pytest.raises(cr.FileError, match="cannot be read: not a sweep"):
