@@ -116,6 +116,7 @@ def label_tiles(figure: Figure, places: Sequence[Axes], x: str, y: str) -> None:
     for axes in places:
         axes.set(xlabel="", ylabel="")
         axes.xaxis.set_major_locator(style.round_ticks(4))
+        axes.ticklabel_format(axis="x", scilimits=(-1, 4))  # -0.005 and 0.000 would touch
     figure.supxlabel(x, fontsize=style.LABEL)
     figure.supylabel(y, fontsize=style.LABEL)
 

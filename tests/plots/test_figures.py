@@ -196,6 +196,16 @@ def test_the_path_and_its_memory_are_drawn() -> None:
     assert said.count("\u22121") == 2 + 4
 
 
+@pytest.mark.parametrize("radius", [1.0, (1.0, np.inf)])
+def test_maps_of_many_digits(radius: Any) -> None:
+    """Titles fit above four maps in a row, and raw lengths below them have room."""
+    scene, P = dataclasses.replace(PAPER, sphere_radius=radius), 3e-7
+    loads, forces = P * np.array([1, 1.2, 0.8, 1, 1]), 0.5 * P * np.array([0, 0.2, 0.3, -0.2, 0.1])
+    maps = plots.path_figures(cr.load_path(scene, loads=loads, forces=forces))["path_stick_slip"]
+    fits(maps)
+    assert max(len(each.get_text()) for each in maps.axes[3].get_xticklabels()) <= 4
+
+
 def test_what_limits_shakedown_is_said() -> None:
     P, swing = LARGEST["paper"], LARGEST["paper"] * np.array([-0.4, 0.4])
     for part, kept in ((0.0, "open in every cycle"), (1.0, "keep sliding")):
