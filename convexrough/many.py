@@ -10,6 +10,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from operator import index
 from typing import Any, ClassVar, cast
 
 import numpy as np
@@ -72,7 +73,9 @@ class Contacts(Table):
 
     def __getitem__(self, k: int) -> Contact:
         """The contact of scene k. Raises IndexError if there is none."""
-        k = range(len(self))[k]
+        if not -len(self) <= index(k) < len(self):
+            raise IndexError(f"scene {k}: expected an index from 0 to {len(self) - 1:,}")
+        k = index(k) % len(self)
         if k not in self._known:
             name, start = "load" if self.by_load else "approach", self.asperity_loads[k]
             self._known[k] = _pressed(self.scenes[k], name, self.controls[k], start)
@@ -214,7 +217,8 @@ def press_many(
         try:
             one = known[k] = _pressed(scenes[k], name, controls[k])
         except SolverError as error:
-            raise SolverError(f"scenes[{k}]: {error}", iterate=error.iterate) from error
+            what, solver, advice = f"scenes[{k}]: {error.what}", error.solver, error.advice
+            raise SolverError(what, solver=solver, advice=advice, iterate=error.iterate) from error
         proof = one.certificate
         errors = proof.load_errors.sum() + n * ROUNDOFF * one.load  # and the rounding of the sum
         own = one.load, errors * (1 + SAFETY), one.approach, proof.approach_error

@@ -349,4 +349,5 @@ def test_rows_of_another_sweep_are_not_mixed_in(tmp_path: Path, monkeypatch: Any
     shutil.copytree(tmp_path / "left", out / "parts", dirs_exist_ok=True)
     assert same(cr.open_sweep(out), mine)
     assert same(swept(SMALL, out=out, resume=True), mine)
+    assert same(swept(SMALL, out=out, overwrite=True), mine)
     assert len([*(out / "parts").iterdir()]) == 4
