@@ -341,7 +341,7 @@ def _energy_error(found: Level, box: Box, start: Trial, moved: Array) -> float:
 
     It is e'|P - P*| with the violations e of the contact law at P and |P - P*| <= `moved`, if Phi
     is proved convex between P and P*; else infinite. Loads q on asperities fixed open add at most
-    e'q; without them, the residuals of the others are lower by A q.
+    e'q; without them, residuals change by A q.
     """
     problem, loads, excess = found.problem, start.loads.high, start.excess
     if start is found.trial:  # P: these loads, rounded and perhaps rescaled to the total

@@ -229,7 +229,7 @@ def summary_in_last(rows: Array) -> str:
 
 
 def in_sheet(style: str) -> str:
-    """The end of a message: the sheet of a workbook, and others with as many wanted columns."""
+    """The end of a message: the sheet that is read, and the number of sheets with cells."""
     return f" in {style}" if style.startswith("sheet ") else ""
 
 
