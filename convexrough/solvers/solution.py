@@ -101,8 +101,8 @@ class Solution(Record):
         changed, largest = float(np.abs(found - loads).max()), float(found.max())
         if not changed <= CORRECTED * largest + TINY:
             raise SolverError(
-                f"Newton steps changed loads by {changed / largest:.3g} of the largest, at most "
-                f"{CORRECTED:g} accepted",
+                f"Newton steps changed loads of up to {largest:.3g} by {changed:.3g}, at most "
+                f"{CORRECTED:g} of the largest accepted",
                 solver=solver,
                 advice="try more iterations, a smaller tolerance, or Newton's method",
                 iterate=loads,
