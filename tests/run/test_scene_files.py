@@ -331,7 +331,7 @@ MISTAKES = [
     (stage(f"{LOOPS}points = 3"),
      "[cycle] loop_points: found 3, expected a whole number, at least 4"),
     (stage(f"{LOOPS}asperities = [61]"),
-     "[cycle] loop_asperities: asperities: found [61], expected whole numbers from 0 to"),
+     "[cycle] loop_asperities: found [61], expected whole numbers from 0 to 60: indices"),
     (stage("[path]\nloads = [1e-7]\nforces = [0.0, 0.0]"),
      "[path] loads, forces: found 1 and 2 values"),
     (stage("[path]\nloads = [1e-7]\nforces = [1e-7]"), "[path]: forces[0]"),

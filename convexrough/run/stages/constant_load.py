@@ -15,6 +15,7 @@ from convexrough.contact import Contact
 from convexrough.errors import blamed_on
 from convexrough.friction.cycle import Loop, loops
 from convexrough.friction.fretting import Fretting, fretting, fretting_columns
+from convexrough.friction.onset import indices
 from convexrough.friction.path import history
 from convexrough.friction.shear import shear
 from convexrough.friction.steady import cycles
@@ -126,6 +127,8 @@ class CycleStage(Stage):
                 yield f"maximum_fraction[{i}]", f"found {high}, {expected}"
 
     def compute(self, contact: Contact) -> CycleResult:
+        if isinstance(asked := self.loop_asperities, list):
+            indices("[cycle] loop_asperities", asked, len(contact.scene))
         if self.displacement:
             with blamed_on("[cycle]"):
                 found = cycles(contact, displacement=self.displacement)
@@ -167,8 +170,7 @@ class CycleResult(Result):
             distances = contact.scene.asperities.distances
             chosen = one_of_each_ring(distances, contact.loads, MOST_LOOPS)
         points = stage.loop_points or affordable
-        with blamed_on("[cycle] loop_asperities"):
-            return loops(self.found, points, None if chosen == "all" else chosen)
+        return loops(self.found, points, None if chosen == "all" else chosen)
 
     @cached_property
     def worn(self) -> list[Fretting]:
