@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from convexrough.arithmetic.balls import TINY
-from convexrough.arrays import Array, Indices, largest, summed, taken
+from convexrough.arrays import Array, Indices, evenly, largest, summed, taken
 from convexrough.errors import InputError
 from convexrough.influence import Kind, couple
 from convexrough.influence.choice import FEW_ASPERITIES
@@ -22,6 +24,14 @@ from convexrough.sphere import hertz
 #: `all_that_could_touch` a scene extends at least that far. If the weights are 0 beyond this, the
 #: bound is computed on a scene WIDER times as large.
 LEAST_REACH, WIDER = 1.5, 4.0 / 3.0
+
+#: The bound of a lattice is used if at least this part of the sites in a box about the asperities
+#: is occupied. A heuristic: the bound holds for any part, but is poor for few.
+OCCUPIED = 0.5
+
+#: The bound of a lattice is tried with equal weights on all asperities whose depths below the
+#: highest one are at most one of these parts of the largest depth: four for each factor of 2.
+DEPTHS = 2.0 ** (np.arange(-160, 1) / 4.0)
 
 #: Relative change below which the shift tau of `shifted_to_load` counts as converged. A heuristic:
 #: certificates do not rely on the shift.
@@ -98,11 +108,11 @@ def approach_bound(
 def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -> float:
     """Upper bound [length] on the approach at every solution of total `load` [force].
 
-    It is `approach_bound` with rates dP/dL at the indentations `smooth_indentations` as
-    weights. Where contact discs would reach their nearest neighbours, the indentations are reduced,
-    as the bound would be useless.
+    It is `_bound_on_lattice` or, where that is nan, `approach_bound` with rates dP/dL at the
+    indentations `smooth_indentations` as weights. Where contact discs would reach their nearest
+    neighbours, the indentations are reduced, as the bound would be useless.
     """
-    bound, reaches, distances = np.nan, [np.inf], np.hypot(*scene.contact_points.T)
+    bound, reaches = _bound_on_lattice(scene, load), [np.inf]
     if scene.curved:
         radius, heights = scene.mean_radius, scene.asperities.heights
         a = float(hertz.contact_radius(load, scene.material.contact_modulus, radius))
@@ -111,23 +121,55 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
         reaches = [reach, 2.0 * reach, 4.0 * reach, np.inf]
     for reach in reaches:
         if np.isnan(bound):
-            bound = _bound_within(reach, distances, scene, load, influence)
+            bound = _bound_within(reach, scene, load, influence)
     if not np.isfinite(bound):
         raise InputError("load", found=load, expected="a load within the range of float64")
     return bound
 
 
 @np.errstate(all="ignore")
-def _bound_within(
-    reach: float, distances: Array, scene: Scene, load: float, influence: Kind | None
-) -> float:
-    """`highest_approach` with weights for asperities at `distances` up to `reach` from the axis.
+def _bound_on_lattice(scene: Scene, load: float) -> float:
+    """`highest_approach` from equal weights on the m highest asperities, the least for several m:
+    (3) of docs/theory/certificate.md. It is nan if most sites of a box are vacant, or without a
+    lattice."""
+    lattice, sites = scene.lattice, scene.asperities.layout.sites
+    if lattice is None or sites is None:
+        return np.nan
+    if len(sites) < OCCUPIED * math.prod(1.0 + float(np.ptp(each)) for each in sites.T):
+        return np.nan
+    offsets, modulus = scene.offsets - scene.offset_errors, scene.material.contact_modulus
+    coefficients = evenly(partial(hertz.local_coefficient, modulus), scene.relative_radii)
+    top, most = float(offsets.max()), float(coefficients.max())
+    depths, cubes = top - offsets, evenly(lambda k: (k / most) ** 3.0, coefficients)
+    limits = float(depths.max()) * DEPTHS
+    group = np.searchsorted(limits, depths)
+    counted = (np.bincount(group, each, len(DEPTHS)) for each in (None, cubes, depths))
+    m, cubes, below = (np.cumsum(each, dtype=np.float64) for each in counted)
+    local = most * np.cbrt(cubes) / m * load ** (2.0 / 3.0)
+    closest = lattice.spacing - 3.0 * lattice.site_error
+    moved = load / (np.pi * modulus * closest) * most_inverse_distances(m) / m
+    bounds = local + moved + below / m - top
+    bounds += (SAFETY + len(depths) * ROUNDOFF) * (local + moved + below / m + abs(top))
+    # Weights only on asperities that can touch: so it also holds for the scene of these alone.
+    return float(bounds[limits - top < bounds].min(initial=np.inf))
+
+
+def most_inverse_distances(m: Array) -> Array:
+    """Upper bound on the sum of h / r_ij over m points j other than i, where h is the least
+    distance of two points of the set: docs/theory/certificate.md, before (3)."""
+    return np.asarray(4.0 * (np.sqrt(1.0 + m) - 1.0))
+
+
+@np.errstate(all="ignore")
+def _bound_within(reach: float, scene: Scene, load: float, influence: Kind | None) -> float:
+    """`highest_approach` with weights for asperities at distances up to `reach` from the axis.
 
     It is nan if asperities beyond would have weights, too, or if the weights, as loads, may move
     one beyond farther than all within. Two asperities are at least as far apart as their distances
     from the axis differ.
     """
-    far, modulus = distances > reach, scene.material.contact_modulus
+    distances, modulus = np.hypot(*scene.contact_points.T), scene.material.contact_modulus
+    far = distances > reach
     near = scene.asperities.layout.sorted(~far)
     if len(near) == 0:
         return np.nan

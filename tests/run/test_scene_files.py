@@ -98,7 +98,7 @@ def test_an_array_for_the_largest_load_of_a_path(read: Any) -> None:
         return contact, scene.compute(contact)[1].found[0], list(scene.cautions(contact))
 
     (pressed, grown, said), (_, whole, _) = run(""), run("within = 0.03")
-    assert (len(pressed.scene), (pressed.loads > 0).sum()) == (121, 13)
+    assert (len(pressed.scene), (pressed.loads > 0).sum()) == (127, 13)
     assert not said
     assert grown.losses[-1] == pytest.approx(whole.losses[-1], rel=1e-12)
     *_, narrow = run("within = 0.0067")
