@@ -35,7 +35,7 @@ TOUCHING, OPEN = 1, 2
 
 #: For at most this many asperities that can touch, a contact keeps the operator for friction, and a
 #: certificate for the gaps.
-MOST_KEPT = {"dense": ALL_SHARP, "lattice": 2**19, "scattered": 2**16}
+MOST_KEPT = {"dense": ALL_SHARP, "lattice": 2**21, "scattered": 2**16}
 
 #: If no contact radius of a solution exceeds this fraction of the distance to the nearest
 #: neighbour, every other solution has a contact disc that covers the summit of the nearest

@@ -39,20 +39,28 @@ def sites_within(
     The sites are ordered by distance and then by angle; the indices sort them by i and then by j.
     """
     skew = round(2.0 * second[0])  # |i b1 + j b2|^2 = i^2 + skew i j + j^2
-    least = 1.0 - skew**2 / 4.0  # |i b1 + j b2|^2 is at least this times i^2, and times j^2
-    top = int(np.sqrt(limit / least)) + 2
-    steps = np.arange(-top, top + 1)
-    norms = np.add.outer(steps * steps, steps * steps)
-    if skew:
-        norms += np.multiply.outer(skew * steps, steps)
+    # All sites but the origin are rotations of those with i > 0 and j >= 0.
+    steps, rotations = np.arange(int(np.sqrt(limit)) + 2), 4 + skew * 2
+    i, j = steps[1:, None], steps
+    norms = i * i + skew * i * j + j * j
     taken = norms <= limit
-    i, j = (each - top for each in np.nonzero(taken))
-    turns = np.arctan2(second[1] * j, i + second[0] * j) % (2 * np.pi) / 7.0
-    order = np.argsort(norms[taken] + turns)  # turns are below 1, the least difference of two norms
-    back = np.empty_like(order)
-    back[order] = np.arange(len(order))
-    others = min(float(norms[~taken].min()), least * (top + 1) ** 2)
-    return np.stack((i[order], j[order]), axis=1).astype(np.int32), back, others
+    others = float(norms[~taken].min())
+    i, j = np.nonzero(taken)
+    i, norms = i + 1, norms[taken]
+    turns = np.arctan2(second[1] * j, i + second[0] * j) / 2.0
+    order = np.argsort(norms + turns)  # turns are below 1, the least difference of two norms
+    i, j, norms = i[order], j[order], norms[order]
+    _, first, count = np.unique(norms, return_index=True, return_counts=True)
+    place = 1 + np.arange(len(i)) + np.repeat((rotations - 1) * first, count)
+    sites = np.zeros((1 + rotations * len(i), 2), dtype=np.int32)
+    for _ in range(rotations):
+        sites[place] = np.stack((i, j), axis=1)
+        place += np.repeat(count, count)
+        i, j = -j, i + skew * j
+    most = int(np.abs(sites).max())
+    places = np.full((2 * most + 1, 2 * most + 1), -1)
+    places[tuple((sites + most).T)] = np.arange(len(sites))
+    return sites, places[places >= 0], others
 
 
 @dataclass(frozen=True, eq=False)
