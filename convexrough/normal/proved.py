@@ -117,9 +117,7 @@ def _missing(problem: NormalProblem, state: Trial) -> tuple[Any, Any, Any]:
     grows = coupled + 2.0 / 3.0 * local
     middle = summed(np.where(state.inside, grows, 0.0)) / summed(1.0 * state.inside)
     rest = np.abs(grows - middle) + 2 * state.product.radius + SAFETY * grows + part * local
-    found = part * loads, part * coupled, part * rest
-    extra, coupled, bent = (np.where(part <= 0.5, each, np.inf) for each in found)
-    return extra, coupled, bent
+    return part * loads, part * coupled, np.where(part <= 0.5, part * rest, np.inf)
 
 
 def _or_by_law(P: Pair, dP: Array, n: Pair, dn: Array, k: Pair, dk: Array) -> tuple[Pair, Array]:

@@ -22,6 +22,7 @@ from convexrough.arrays import Array, frozen, largest, summed
 from convexrough.convex.theorem import excess
 from convexrough.errors import SolverError
 from convexrough.normal.problem import NormalProblem
+from convexrough.roundoff import SAFETY
 from convexrough.sphere import hertz
 
 #: Largest number of corrections. Each aims at a residual of ENOUGH times its rounding error.
@@ -206,7 +207,7 @@ def completed(problem: NormalProblem, loads: Pair, *, roughly: bool = False) -> 
         return loads, Ball.exact(np.zeros(problem.control.shape))
     if not loads.high.any():
         return loads, problem.control
-    completed, n = Pair(*(part.copy() for part in loads)), loads.high.shape[-1]
+    completed = Pair(*(part.copy() for part in loads))
     missed = np.abs(summed(loads.high) - problem.load)
     if not roughly or (missed > FITS * largest(loads.high)).any():
         power = -np.frexp(largest(loads.high))[1]  # a power of two that avoids overflow
@@ -215,22 +216,22 @@ def completed(problem: NormalProblem, loads: Pair, *, roughly: bool = False) -> 
         if loads.high.ndim > 1:
             total = Pair(*(part[:, None] for part in total))
         completed = loads * (problem.control.mid / total)
-    rows = Pair(*(part.reshape(-1, n) for part in completed))  # views
-    missing = _missing(rows, problem.control.mid)
-    largest_ones = np.arange(len(rows.high)), rows.high.argmax(axis=1)
-    rows.high[largest_ones], rows.low[largest_ones] = rows.at(largest_ones) + missing
-    rounding = 8 * PAIR_ROUNDOFF * problem.load + (n + 2) * TINY
-    return completed, Ball.around(np.zeros_like(rounding), problem.control.radius + rounding)
+    at: Any = completed.high.argmax(axis=-1)  # the largest load; in a stack, that of each row
+    if completed.high.ndim > 1:
+        at = np.arange(len(at)), at
+    missing = _missing(completed, problem.control.mid)
+    completed.high[at], completed.low[at] = completed.at(at) + missing
+    radius = problem.control.radius + 8 * PAIR_ROUNDOFF * problem.load
+    radius = np.asarray((radius + (loads.high.shape[-1] + 2) * TINY) * (1 + SAFETY))
+    return completed, Ball(Pair.exact(0.0 * radius), radius)
 
 
 def _missing(loads: Pair, total: Pair) -> Pair:
-    """(m,) the prescribed totals minus the sums of loads (m, n)."""
-    m, n = loads.high.shape
-    if m == 1 and n <= FEW_TERMS and np.isfinite(loads.high).all():
-        given = [np.asarray(part).item() for part in total]
-        terms = [*given, *(-loads.high[0]).tolist(), *(-loads.low[0]).tolist()]
-        return Pair.exact([math.fsum(terms)])
-    return Pair(*(np.reshape(part, -1) for part in total)) - loads.total()
+    """The prescribed totals minus the sums of loads: () for loads (n,), (m,) for (m, n)."""
+    if loads.high.ndim == 1 and loads.high.size <= FEW_TERMS and np.isfinite(loads.high).all():
+        terms = (*total, *(-loads.high).tolist(), *(-loads.low).tolist())
+        return Pair(math.fsum(terms), 0.0)
+    return Pair(*(np.reshape(part, loads.high.shape[:-1]) for part in total)) - loads.total()
 
 
 def defect_of(state: Trial) -> Any:
