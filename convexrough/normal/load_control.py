@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -10,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from convexrough.arithmetic.balls import TINY
-from convexrough.arrays import Array, Indices, evenly, largest, summed, taken
+from convexrough.arrays import Array, Indices, even, evenly, largest, summed, taken
 from convexrough.errors import InputError
 from convexrough.influence import Kind, couple
 from convexrough.influence.choice import FEW_ASPERITIES
@@ -25,12 +24,14 @@ from convexrough.sphere import hertz
 #: bound is computed on a scene WIDER times as large.
 LEAST_REACH, WIDER = 1.5, 4.0 / 3.0
 
-#: The bound of a lattice is used if at least this part of the sites in a box about the asperities
-#: is occupied. A heuristic: the bound holds for any part, but is poor for few.
-OCCUPIED = 0.5
+#: `_bound_by_discs` is used if its discs cover at least the part COVERED of a rectangle about them,
+#: and if the mean depth of their asperities below the highest one is at most DEEP times the bound's
+#: height above the first contact (1/3 for a smooth sphere). Heuristics: elsewhere the bound holds,
+#: but is poor.
+COVERED, DEEP = 0.45, 0.45
 
-#: The bound of a lattice is tried with equal weights on all asperities whose depths below the
-#: highest one are at most one of these parts of the largest depth: four for each factor of 2.
+#: Largest depths below the highest asperity that are tried: these parts of the indentation of one
+#: asperity under the whole load, four for each factor of 2.
 DEPTHS = 2.0 ** (np.arange(-160, 1) / 4.0)
 
 #: Relative change below which the shift tau of `shifted_to_load` counts as converged. A heuristic:
@@ -108,11 +109,11 @@ def approach_bound(
 def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -> float:
     """Upper bound [length] on the approach at every solution of total `load` [force].
 
-    It is `_bound_on_lattice` or, where that is nan, `approach_bound` with rates dP/dL at the
+    It is `_bound_by_discs` or, where that is nan, `approach_bound` with rates dP/dL at the
     indentations `smooth_indentations` as weights. Where contact discs would reach their nearest
     neighbours, the indentations are reduced, as the bound would be useless.
     """
-    bound, reaches = _bound_on_lattice(scene, load), [np.inf]
+    bound, reaches = _bound_by_discs(scene, load), [np.inf]
     if scene.curved:
         radius, heights = scene.mean_radius, scene.asperities.heights
         a = float(hertz.contact_radius(load, scene.material.contact_modulus, radius))
@@ -128,36 +129,48 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
 
 
 @np.errstate(all="ignore")
-def _bound_on_lattice(scene: Scene, load: float) -> float:
-    """`highest_approach` from equal weights on the m highest asperities, the least for several m:
-    (3) of docs/theory/certificate.md. It is nan if most sites of a box are vacant, or without a
-    lattice."""
-    lattice, sites = scene.lattice, scene.asperities.layout.sites
-    if lattice is None or sites is None:
+def _bound_by_discs(scene: Scene, load: float) -> float:
+    """`highest_approach` by (3) of docs/theory/certificate.md, from discs about asperities that do
+    not overlap; nan where it would be poor (`COVERED`)."""
+    lattice, modulus = scene.lattice, scene.material.contact_modulus
+    if np.inf in along(scene.sphere_radius):  # flats and cylinders
         return np.nan
-    if len(sites) < OCCUPIED * math.prod(1.0 + float(np.ptp(each)) for each in sites.T):
-        return np.nan
-    offsets, modulus = scene.offsets - scene.offset_errors, scene.material.contact_modulus
-    coefficients = evenly(partial(hertz.local_coefficient, modulus), scene.relative_radii)
-    top, most = float(offsets.max()), float(coefficients.max())
-    depths, cubes = top - offsets, evenly(lambda k: (k / most) ** 3.0, coefficients)
-    limits = float(depths.max()) * DEPTHS
-    group = np.searchsorted(limits, depths)
-    counted = (np.bincount(group, each, len(DEPTHS)) for each in (None, cubes, depths))
-    m, cubes, below = (np.cumsum(each, dtype=np.float64) for each in counted)
-    local = most * np.cbrt(cubes) / m * load ** (2.0 / 3.0)
-    closest = lattice.spacing - 3.0 * lattice.site_error
-    moved = load / (np.pi * modulus * closest) * most_inverse_distances(m) / m
-    bounds = local + moved + below / m - top
-    bounds += (SAFETY + len(depths) * ROUNDOFF) * (local + moved + below / m + abs(top))
+    if lattice is not None:
+        radii = even(0.5 * lattice.spacing - 1.5 * lattice.site_error, len(scene))
+    else:
+        radii = np.maximum(0.5 * scene.nearest * (1 - SAFETY) - 1.5 * scene.point_error, 0.0)
+    k = evenly(partial(hertz.local_coefficient, modulus), scene.relative_radii)
+    sharpest, widest = float(k.max()), float(radii.max())
+    usual = k[0] if k.strides == (0,) else np.median(k)
+    weights = evenly(np.square, radii / widest) * np.minimum(1.0, (usual / k) ** 1.5)
+    offsets = scene.offsets - scene.offset_errors
+    depths, top, locally = offsets.max() - offsets, float(offsets.max()), weights * (k / sharpest)
+    alone = hertz.indentation(load, sharpest) + load / (np.pi * modulus * widest)
+    group = np.searchsorted(limits := alone * DEPTHS, depths)
+    whole, cubes, below = (
+        np.cumsum(np.bincount(group, each, len(DEPTHS) + 1)[:-1])
+        for each in (weights, locally * locally * locally, weights * depths)
+    )
+    local = sharpest * np.cbrt(cubes) / whole * load ** (2.0 / 3.0)
+    moved = load / (np.pi * modulus * widest) * most_potential(whole, float(radii.min()) / widest)
+    depth, above = below / whole, local + moved + below / whole
+    bounds = above - top + (SAFETY + len(depths) * ROUNDOFF) * (above + abs(top))
     # Weights only on asperities that can touch: so it also holds for the scene of these alone.
-    return float(bounds[limits - top < bounds].min(initial=np.inf))
+    best = np.where(limits - top < bounds, bounds, np.inf).argmin()
+    chosen = depths <= limits[best]
+    x, y = (2.0 * widest + np.ptp(each[chosen]) for each in scene.contact_points.T)
+    covers = np.pi * float((radii[chosen] ** 2).sum()) >= COVERED * float(x * y)
+    good = limits[best] - top < bounds[best] < np.inf and depth[best] <= DEEP * above[best]
+    return float(bounds[best]) if covers and good else np.nan
 
 
-def most_inverse_distances(m: Array) -> Array:
-    """Upper bound on the sum of h / r_ij over m points j other than i, where h is the least
-    distance of two points of the set: docs/theory/certificate.md, before (3)."""
-    return np.asarray(4.0 * (np.sqrt(1.0 + m) - 1.0))
+def most_potential(areas: Any, least: float) -> Any:
+    """Upper bounds on the sum of q_j / r_ij over j other than i, with weights q_j = s_j^2 / `areas`
+    on some of several discs that do not overlap: docs/theory/certificate.md, before (3).
+
+    areas : sum of s_j^2 for the radii s_j of these discs;  least : the smallest radius of all discs
+    """
+    return 2.0 * (np.sqrt(areas + least * least) - least) / areas
 
 
 @np.errstate(all="ignore")
@@ -238,7 +251,7 @@ def all_that_could_touch(
     farthest     : returns the largest distance of asperities that can touch at an approach [length]
 
     A bound found on a wide scene also holds for a narrower scene that contains all asperities with
-    a nonzero weight: in (2) of docs/theory/certificate.md the sum and lambda are then the same.
+    a nonzero weight (docs/theory/certificate.md).
     """
     axis = scene_within(0.0)
     modulus, radius = axis.material.contact_modulus, max(along(axis.sphere_radius))

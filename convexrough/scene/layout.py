@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.cached import Cached
 from convexrough.scene.lattice import Lattice, Sites
-from convexrough.scene.neighbours import refuse_coincident
+from convexrough.scene.neighbours import nearest_distances, refuse_coincident
 
 #: For more asperities than this, a lattice is looked for before nearest neighbours are computed.
 MANY = 5000
@@ -76,7 +76,7 @@ class Layout(Cached):
 
     def __post_init__(self) -> None:
         if self.made is None and (len(self.points) <= MANY or self.lattice is None):
-            refuse_coincident(self.points)
+            refuse_coincident(self.points, self.nearest)
 
     @classmethod
     def of(cls, second: tuple[float, float], spacing: float, limit: float) -> Layout:
@@ -106,6 +106,11 @@ class Layout(Cached):
     def __getstate__(self) -> dict[str, Any]:
         """The fields only: what follows from them is computed again."""
         return {each.name: getattr(self, each.name) for each in fields(self)}
+
+    @cached_property
+    def nearest(self) -> Array:
+        """(n,) [length] distance of each point to its nearest neighbour; infinite for one point."""
+        return frozen(nearest_distances(self.points))
 
     @cached_property
     def lattice(self) -> Lattice | None:

@@ -35,11 +35,13 @@ def crowding(points: Array, radii: Array) -> float:
     return max(worst, float(((radii[i] + radii[j]) / apart).max(initial=0.0)))
 
 
-def refuse_coincident(points: Array) -> None:
-    """Raise InputError if two asperities coincide, or are too near to each other for float64."""
+def refuse_coincident(points: Array, distances: Array) -> None:
+    """Raise InputError if two asperities coincide, or are too near to each other for float64.
+
+    distances : (n,) [length] distance of each point to its nearest neighbour
+    """
     if len(points) < 2:
         return
-    distances = nearest_distances(points)
     rounding = 16 * np.finfo(float).eps * np.abs(points).max()  # far above the rounding of points
     if (worst := float(distances.min())) <= rounding or worst < SMALLEST:
         first = int(np.argmin(distances))

@@ -19,7 +19,7 @@ from convexrough.scene import base
 from convexrough.scene.asperities import Asperities
 from convexrough.scene.lattice import Lattice
 from convexrough.scene.material import Material
-from convexrough.scene.neighbours import refuse_coincident
+from convexrough.scene.neighbours import nearest_distances, refuse_coincident
 from convexrough.tabular.units import NAMELESS, UnitNames, parsed
 
 Geometry = Literal["summit", "closest"]
@@ -75,7 +75,7 @@ class Scene(Record):
         # scaled.
         tips, sphere = self.asperities.tip_radii, min(base.along(self.sphere_radius))
         if self.geometry == "closest" and ((tips != tips[0]).any() or tips[0] > sphere):
-            refuse_coincident(self.contact_points)
+            refuse_coincident(self.contact_points, self.nearest)
 
     def __len__(self) -> int:
         return len(self.asperities)
@@ -116,6 +116,13 @@ class Scene(Record):
         for R, axes in self.curved:
             points[:, axes] *= (R / self.far_radii(R))[:, None]
         return frozen(points)
+
+    @cached_property
+    def nearest(self) -> Array:
+        """(n,) [length] distance of each contact point to the nearest other one."""
+        layout = self.asperities.layout
+        summits = self.contact_points is layout.points
+        return layout.nearest if summits else frozen(nearest_distances(self.contact_points))
 
     def far_radii(self, radius: float) -> Array:
         """(n,) [length] `radius`; in the geometry "closest", `radius` + the tip radius rho_i.
