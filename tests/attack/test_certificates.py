@@ -15,7 +15,7 @@ from friction_scenes import LARGEST, PAPER, SCENES, around, on_flat, shaded
 from levels_reference import Bristles, assert_close, cycle_loss, judge_of, loss_and_displacement
 from multiprecision import exact
 from scenes import MATERIAL, PAPER_APPROACH, STEEL, on_sphere, paper, reference
-from status_audit import assert_honest, compare, excess
+from status_audit import compare, excess
 
 import convexrough as cr
 from convexrough import checker
@@ -37,27 +37,21 @@ CROWDED = [(around, 4.0), (around, 3.5), (lambda P: cr.press(shaded(), load=P), 
 
 
 @pytest.mark.parametrize(("make", "load"), CROWDED)
-def test_forces_where_order_fails(make, load) -> None:  # type: ignore[no-untyped-def]
-    """Bristles are good to 1e-7 of the largest force here, and the forces are 2e-6 off, or more."""
-    contact, force = make(load), 0.25 * load
+def test_losses_where_order_fails(make: Any, load: float) -> None:
+    """Bristles are good to 1e-7 of the largest force and 1e-5 of the loss here, and the forces are
+    2e-6 off, or more, and the loss 2e-4.
+    """
+    contact = make(load)
     assert contact.certificate.scope == "global"
-    state = cr.shear(contact, force=force)
-    true = Bristles(contact).to(np.linspace(0, force, 101)[1:]).forces
-    slack = 5e-7 * true.max()
-    assert (np.abs(state.forces - true) <= state.certificate.force_errors + slack).all()
-    judged = cr.certify_shear(contact, state.forces, force=force)
-    assert (np.abs(state.forces - true) <= judged.force_errors + slack).all()
-
-
-@pytest.mark.sample(1)
-@pytest.mark.parametrize("load", [3.0, 3.5, 4.0])
-def test_losses_where_order_fails(load: float) -> None:
-    """Bristles are good to 1e-5 of the loss, and the loss is 2e-4 off, or more."""
-    contact = around(load)
     for fraction in (0.5, 0.8):
         force = fraction * 0.5 * load
         cycle, true = cr.cycle(contact, maximum=force), cycle_loss(contact, force)
         assert abs(cycle.loss - true) <= cycle.loss_error + 2e-5 * true
+        borne = Bristles(contact).to(np.linspace(0, force, 101)[1:]).forces
+        state = cr.shear(contact, force=force)
+        for proof in (state.certificate, cr.certify_shear(contact, state.forces, force=force)):
+            off = np.abs(state.forces - borne)
+            assert (off <= proof.force_errors + 5e-7 * borne.max()).all()
 
 
 @pytest.mark.parametrize("turns", [[0.8, -0.6, 0.5], [0.8, 0.4, 0.6, -0.2]])
@@ -95,16 +89,13 @@ def test_no_false_word_of_given_forces() -> None:
 
 def test_no_slip_of_what_does_not_touch() -> None:
     """The middle of three is open, and the proof is too coarse to tell."""
-    points, low, high = [[0.0, 0.0], [0.003, 0.0], [-0.003, 0.0]], -3e-5, 0.0
+    points = [[0.0, 0.0], [0.003, 0.0], [-0.003, 0.0]]
 
     def pressed(height: float) -> cr.Contact:
         scene = on_sphere(points, heights=[height, 0.0, 0.0], friction=0.5)
         return cr.press(scene, approach=3e-5)
 
-    for _ in range(40):
-        middle = (low + high) / 2
-        low, high = (middle, high) if pressed(middle).loads[0] == 0 else (low, middle)
-    contact = pressed(low - 1e-11)
+    contact = pressed(pressed(-3e-5).gaps[0] - 3e-5 - 1e-11)
     assert contact.status[0] == "open"
     state = cr.shear(contact, force=0.15 * contact.load)
     document = json.loads(json.dumps(contact.proof(sheared=[state]).document))
@@ -390,15 +381,6 @@ def test_the_duality_gap_of_loads_that_underflow(load: float) -> None:
     scene = on_sphere([[0.0, 0.0], [0.01, 0.0]], heights=-1e-8)
     gap = cr.certify(scene, [load, 0.0], approach=5e-9).duality_gap
     assert Fraction(gap) >= Fraction(5e-9) * Fraction(load)
-
-
-@pytest.mark.parametrize("load", [1e-310, 5e-324])
-def test_bounds_of_the_smallest_loads_on_a_lattice(load: float) -> None:
-    scene, given = paper(), np.full(61, load)
-    judged = cr.certify(scene, given, approach=PAPER_APPROACH, influence="lattice")
-    exact = reference(scene, approach=PAPER_APPROACH)
-    assert_honest(judged, given, exact)
-    assert judged.duality_gap >= excess(scene, given, exact)
 
 
 def test_errors_of_a_claim_are_not_short_by_a_rounding() -> None:

@@ -71,45 +71,37 @@ def bernstein(polynomial: Any, limit: Any) -> list[Fraction]:
     return [coefficient(a, b) for a in range(m + 1) for b in range(n + 1)]
 
 
-@pytest.mark.parametrize("cones", [FOUR_CONES, FIVE_CONES])
-def test_powers_satisfy_the_cones_with_equality(cones: Any) -> None:
+FOUR_AS_PRINTED = (t - s) ** 2 * (S / 3 * t**3 * (1 - t) + C * t**2 * (1 - t) + E * t**3)
+FOUR_AS_PRINTED += D * (t**2 - s**2) ** 2
+FIVE_AS_PRINTED = S / 3 * t**3 * (1 - t) + C2 * t**2 * (1 - t) + E3 * t**3
+FIVE_AS_PRINTED = (t - s) ** 2 * (FIVE_AS_PRINTED + B1 * t * (1 - t) + A0 * (1 - t))
+
+#: The cones, the limit of S, the weights, and what their sum is where the lift is the powers of t.
+PROGRAMS = [
+    (FOUR_CONES, (FOUR_CONES_LIMIT, LIMIT_FOUR), FOUR_WEIGHTS, FOUR_AS_PRINTED),
+    (FIVE_CONES, (FIVE_CONES_LIMIT, sp.Integer(1)), FIVE_WEIGHTS, FIVE_AS_PRINTED),
+]
+
+
+@pytest.mark.parametrize(("cones", "limits", "weights", "printed"), PROGRAMS)
+def test_the_lifted_energy_less_a_tangent_is_a_sum_of_cones(
+    cones: Any, limits: Any, weights: Any, printed: Any
+) -> None:
+    """With weights that are not negative up to the limit; powers of t satisfy the cones with
+    equality, and the page prints the identity for them.
+    """
     for x, y, w in forms(cones):
         on_curve = [sp.expand(form.subs(CURVE)) for form in (x, y, w)]
         assert sp.expand(on_curve[0] * on_curve[1] - on_curve[2] ** 2) == 0
         for form in on_curve[:2]:
             assert all(value >= 0 for value in bernstein(form.subs(t, s) + 0 * S, 1))
     assert sp.expand(LIFTED_ENERGY.subs(CURVE) - ENERGY) == 0
-
-
-FOUR_AS_PRINTED = (t - s) ** 2 * (S / 3 * t**3 * (1 - t) + C * t**2 * (1 - t) + E * t**3)
-FOUR_AS_PRINTED += D * (t**2 - s**2) ** 2
-FIVE_AS_PRINTED = S / 3 * t**3 * (1 - t) + C2 * t**2 * (1 - t) + E3 * t**3
-FIVE_AS_PRINTED = (t - s) ** 2 * (FIVE_AS_PRINTED + B1 * t * (1 - t) + A0 * (1 - t))
-
-
-@pytest.mark.parametrize(
-    ("cones", "weights", "printed"),
-    [
-        (FOUR_CONES, FOUR_WEIGHTS, FOUR_AS_PRINTED),
-        (FIVE_CONES, FIVE_WEIGHTS, FIVE_AS_PRINTED),
-    ],
-)
-def test_the_lifted_energy_less_a_tangent_is_a_sum_of_cones(
-    cones: Any, weights: Any, printed: Any
-) -> None:
-    """And so is the identity that the page prints, where the lift is the powers of t."""
     combination = sum(w * cone for w, cone in zip(weights, tangents(cones), strict=True))
     assert sp.expand(LIFTED_ENERGY - LAM * Y3 + MU - combination) == 0
     assert sp.expand(combination.subs(CURVE) - printed) == 0
-
-
-@pytest.mark.parametrize(
-    ("weights", "limit"), [(FOUR_WEIGHTS, LIMIT_FOUR), (FIVE_WEIGHTS, sp.Integer(1))]
-)
-def test_no_weight_is_negative(weights: Any, limit: Any) -> None:
-    for weight in weights:
-        assert min(bernstein(weight, limit)) >= 0
-    assert float(limit) in (FOUR_CONES_LIMIT, FIVE_CONES_LIMIT)
+    package, limit = limits
+    assert package == float(limit)
+    assert all(min(bernstein(weight, limit)) >= 0 for weight in weights)
 
 
 def test_the_limits_are_sharp() -> None:

@@ -35,17 +35,10 @@ from convexrough.proof import prove
 SOURCE = Path(checker.__file__)
 
 
-def test_it_imports_the_standard_library_only() -> None:
+def test_no_number_of_its_source_is_a_float() -> None:
+    """That it imports the standard library only, the next test shows."""
     for node in ast.walk(ast.parse(SOURCE.read_text("utf-8"))):
-        if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0
-            names = [node.module or ""]
-        else:
-            assert not isinstance(node, ast.Constant) or not isinstance(node.value, float)
-            continue
-        assert {name.split(".")[0] for name in names} <= sys.stdlib_module_names
+        assert not isinstance(node, ast.Constant) or not isinstance(node.value, float)
 
 
 @pytest.fixture(scope="module")
@@ -509,13 +502,16 @@ def a_number(rng: random.Random, document: Any, *under: str) -> Place:
     return rng.choice([(*under, *p) for p in leaves(start) if "0x" in look(start, p)])
 
 
-def one_number(rng: random.Random, document: Any) -> Any:
-    part = rng.choice([(), ("claims",), ("scene",), ("prescribed",)])
-    path = a_number(rng, document, *part)
-    if rng.random() < 0.2:
+def one_text(rng: random.Random, document: Any) -> Any:
+    """A number that is a little off, or anything else that a proof contains, or an odd thing."""
+    part = rng.choice([(), ("claims",), ("claims", "status"), ("scene",), ("prescribed",)])
+    if rng.random() < 0.5:
+        other = rng.choice(honest())
         odd = ["nan", "0x1.8p+99999", "1e-3", "", None, 1, [], {}, (5e-324).hex(), (1e150).hex()]
-        put(document, path, rng.choice([*odd, (0.0).hex(), (-1.0).hex()]))
+        new = rng.choice([look(other, rng.choice(leaves(other))), (-1.0).hex(), rng.choice(odd)])
+        put(document, (*part, *rng.choice(leaves(look(document, part)))), new)
         return document
+    path = a_number(rng, document, *part[:1])
     value = float.fromhex(look(document, path))
     change = 2.0 ** rng.uniform(-60, 2) * rng.choice([1, -1])
     changed = value * (1 + change) if value else change * 1e-9
@@ -532,15 +528,6 @@ def tighter_bound(rng: random.Random, document: Any) -> Any:
     cut = rng.choice([0.01, 0.3, 0.6, 0.99]) * (high - low)
     low, high = rng.choice([(low + cut, high), (low, high - cut), (high, high), (high, low)])
     put(document, path, [low.hex(), high.hex()])
-    return document
-
-
-def one_status(rng: random.Random, document: Any) -> Any:
-    claimed = ["contact", "open", "undecided", "sliding", "partial", "global", "local", ""]
-    claimed += ["proved", "proved for one step"]
-    claims = document["claims"]
-    path = rng.choice([p for p in leaves(claims) if look(claims, p) in claimed])
-    put(claims, path, rng.choice(claimed))
     return document
 
 
@@ -567,14 +554,7 @@ def changed_box(rng: random.Random, document: Any) -> Any:
     return document
 
 
-def changed_radii(rng: random.Random, document: Any) -> Any:
-    place = rng.choice([document["pressed"], *(each["held"] for each in document["sheared"])])
-    radii = place["radii"]
-    radii[rng.randrange(len(radii))] = rng.choice([[(0.0).hex()], rng.choice(radii), []])
-    return document
-
-
-FORGED = [one_number, tighter_bound, one_status, swapped_part, changed_box, changed_radii]
+FORGED = [one_text, tighter_bound, swapped_part, changed_box]
 
 
 def forged(rng: random.Random) -> tuple[str, bytes]:
