@@ -124,6 +124,10 @@ def test_parts_and_other_points(
     targets = [mixed, mixed + 1e-3, np.concatenate((mixed, [[0.3, 0.4]])), mixed[:0]]
     couplings: list[tuple[Coupling, Array]] = [(part, part.points)]
     couplings += [(part.onto(points), points) for points in targets]
+    if kind == "dense":  # in blocks
+        monkeypatch.setattr(coupling, "KEPT", 0)
+        monkeypatch.setattr(coupling, "ENTRIES", 16)
+        couplings += [(part.onto(points), points) for points in targets]
     if kind == "scattered":
         monkeypatch.setattr(scattered, "FEW_PAIRS", 0)
         couplings += [(part.onto(points), points) for points in targets if len(points) and count]
@@ -251,17 +255,6 @@ def test_slopes_on_lattices_that_are_made(family: str, most: float) -> None:
     for load in scenes.loadings(len(A), rng):
         _, errors = off_and_errors(A, load, rng.integers(0, len(A), 3))
         assert errors.max() <= most * (A.scale * A.falloff(np.abs(load), 2)).max()
-
-
-def test_direct_sums_in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(coupling, "KEPT", 0)
-    monkeypatch.setattr(coupling, "ENTRIES", 16)
-    rng = np.random.default_rng(0)
-    points, targets, loads = rng.random((50, 2)), rng.random((7, 2)), rng.random(50)
-    direct = coupling.DirectCoupling(points, targets, SCALE, 0.0)
-    high, low = inverse_sums(targets, points, loads, SCALE)
-    off = np.abs((direct.apply(loads) - high) - low)
-    assert (off <= direct.rounding(loads).of(high)).all()
 
 
 @pytest.mark.parametrize("family", ["hexagonal", "square"])
