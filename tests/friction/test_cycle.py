@@ -237,8 +237,7 @@ BASES: list[Any] = [1.0, 2.0, (1.0, 1.5)]
 
 #: What differs from scene to scene -> (scenes, approaches).
 SETS = {
-    "heights": (rough(6), 5e-5),
-    "approaches": (rough(4), [5e-5, 1e-5, 2e-6, 7e-5]),
+    "heights and approaches": (rough(4), [5e-5, 1e-5, 2e-6, 7e-5]),
     "tips": (rough(4, tips=0.1), 5e-5),
     "places by tips": (rough(3, tips=0.1, geometry="closest"), 5e-5),
     "places": (scattered(4), 5e-5),

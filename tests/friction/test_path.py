@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from friction_scenes import LARGEST, ONE, PAPER, TWO, follow, path_of, shaded
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from levels_reference import Bristles
 from numpy.testing import assert_allclose
@@ -281,6 +281,7 @@ def test_three_ways_to_one_path(points: list[tuple[float, float]]) -> None:
 
 
 @settings(max_examples=4, deadline=None)
+@example((shaded(), np.array([2.4, 3.0]), np.array([0.3, 0.75])))  # where order fails
 @given(random_paths(0.2, 0.9))
 def test_random_paths_as_cone_programs(sampled: tuple[cr.Scene, Array, Array]) -> None:
     try:
@@ -289,15 +290,6 @@ def test_random_paths_as_cone_programs(sampled: tuple[cr.Scene, Array, Array]) -
         if "dense" not in str(error):
             raise
         return
-    assert differs(conic, step) < 1e-4
-
-
-def test_without_order_steps_as_cone_programs_agree() -> None:
-    scene = shaded()
-    largest = cr.press(scene, approach=1.0).load
-    P, Q = np.array([0.8, 1.0]) * largest, 0.5 * np.array([0.2, 0.5]) * largest
-    curve, step, conic = three_ways(scene, P, Q)
-    assert curve.order == "fails"
     assert differs(conic, step) < 1e-4
 
 

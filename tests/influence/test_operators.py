@@ -144,17 +144,6 @@ def test_parts_and_other_points(
             assert (onto.falloff(loads, power) >= exactly).all()
 
 
-def test_bounds_in_single_precision_are_above_the_sums() -> None:
-    """One load on a large lattice: most sums are far below the rounding of the transforms."""
-    scene = bench_scene("lattice", 12.0)
-    A = couple(scene, np.arange(len(scene)), SCALE)
-    load = np.zeros(len(scene))
-    load[5] = 3.0
-    exactly, _ = inverse_sums(A.points, A.points[[5]], load[[5]])
-    exactly[5] = 0.0
-    assert (A.falloff(load, 1) >= exactly).all()
-
-
 @pytest.mark.parametrize("balanced", [False, True])
 def test_steps_of_more_digits_than_single_precision_has(balanced: bool) -> None:
     """The equation of the step holds to 1e-9. The sum of the loads is kept to seven digits of the

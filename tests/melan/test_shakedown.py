@@ -247,25 +247,36 @@ def test_a_solver_that_lies_does_not_move_the_limit(lie: str, monkeypatch: Any) 
     assert found.gap > truth.gap or lie == "doubled"
 
 
-@pytest.mark.parametrize("kind", ["exact", "elastic"])
-def test_without_order_no_exact_limit_is_claimed(kind: Any) -> None:
+def grazing() -> tuple[cr.Scene, float]:
+    """Three of which the last touches by an indentation of 2e-34, and slides in every cycle."""
+    positions, heights = [[0, 0], [2.0, 0.5], [-1.5, 1.0]], [0, -0.001, -0.02836162543917945]
+    return on_sphere(positions, 1.0, heights, 2.1243957803714115e17, 0.5), 0.0129
+
+
+def dragged() -> tuple[cr.Scene, float]:
     """The shaded asperity is pushed back by a shear force on all."""
-    scene = shaded()
-    load = cr.press(scene, approach=1.4).load
-    found = cr.shakedown(scene, load=load, force_amplitudes=swung(kind, 0.1 * load), kind=kind)
-    assert kind == "elastic" or found.order == "fails"
-    assert (found.lower, found.upper, found.proved) == (0.0, np.inf, False)
+    return shaded(), cr.press(shaded(), approach=1.4).load
 
 
-@pytest.mark.parametrize("kind", ["elastic", "vector"])
-def test_a_contact_that_is_not_proved_proves_no_limit(kind: Any) -> None:
-    """Two side by side, at no least of the energy: nobody can say what they carry."""
-    scene, load = twins()
-    assert "undecided" in cr.press(scene, load=load).status
-    amplitudes = swung(kind, 0.1 * load)
-    found = cr.shakedown(scene, load=load, force_amplitudes=amplitudes, kind=kind)
-    assert (found.lower, found.upper, found.proved) == (0.0, np.inf, False)
-    assert found.factor > 0
+@pytest.mark.parametrize(
+    ("make", "kinds"),
+    [(dragged, "exact elastic"), (twins, "elastic vector"), (grazing, "exact elastic vector")],
+)
+def test_what_is_not_proved_proves_no_limit(make: Any, kinds: str) -> None:
+    """Neither order, nor a contact at no least of the energy, nor a status."""
+    scene, load = make()
+    undecided = cr.press(scene, load=load).status == "undecided"
+    assert undecided.any() == (make != dragged)
+    for kind in kinds.split():
+        amplitudes: Any = swung(kind, 0.045 * load)
+        found = cr.shakedown(scene, load=load, force_amplitudes=amplitudes, kind=kind)
+        assert (found.lower, found.proved) == (0.0, False)
+        assert found.upper == np.inf or make == grazing
+        assert found.factor > 0
+        assert found.order == "fails" or make != dragged or kind == "elastic"
+    if make == grazing:
+        cycle = cr.steady(scene, loads=[load] * 2, forces=[0.003, -0.003])
+        assert cycle.slip_errors[undecided] > 0.01  # it may slide
 
 
 @pytest.mark.parametrize("kind", ["exact", "elastic", "vector"])
@@ -290,21 +301,6 @@ def test_an_asperity_that_opens_as_the_load_rises() -> None:
     forces, loads = [0.005 * load, -0.005 * load, 0.0], [0.0, 0.0, most - load]
     found = cr.shakedown(scene, load=load, force_amplitudes=forces, load_amplitudes=loads)
     assert (found.order, found.lower, found.upper) == ("fails", 0.0, np.inf)
-
-
-@pytest.mark.parametrize("kind", ["exact", "elastic", "vector"])
-def test_an_undecided_asperity_leaves_the_limit_open(kind: Any) -> None:
-    """It touches, by an indentation of 2e-34, and slides in every cycle."""
-    asperities = cr.Asperities(
-        [[0, 0], [2.0, 0.5], [-1.5, 1.0]], 1.0, heights=[0, -0.001, -0.02836162543917945]
-    )
-    material = cr.Material(1.0, 0.3)
-    scene = cr.Scene(2.1243957803714115e17, asperities, material, 0.5, geometry="summit")
-    assert cr.press(scene, load=0.0129).status[2] == "undecided"
-    found = cr.shakedown(scene, load=0.0129, force_amplitudes=swung(kind, 6e-4), kind=kind)
-    assert found.lower == 0.0
-    cycle = cr.steady(scene, loads=[0.0129] * 2, forces=[0.003, -0.003])
-    assert cycle.slip_errors[2] > 0.01  # it may slide
 
 
 @pytest.mark.parametrize("kind", ["exact", "elastic", "vector"])
