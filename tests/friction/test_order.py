@@ -263,7 +263,6 @@ def test_weights_of_the_linear_program_are_not_negative() -> None:
         assert weights.any()
 
 
-@pytest.mark.sample(2)
 @pytest.mark.parametrize("load", [2.5, 3.0, 3.5, 4.0])
 @pytest.mark.parametrize("share", [0.0, 0.5])
 def test_no_proof_where_the_middle_is_lifted_out(load: float, share: float) -> None:

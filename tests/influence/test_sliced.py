@@ -45,7 +45,6 @@ def among(ball: Ball, m: int) -> arb:
     return middle(ball[m]) + arb(0, float(ball.radius[m]))
 
 
-@pytest.mark.sample(5)
 @pytest.mark.parametrize("name", BASES)
 @pytest.mark.parametrize("count", [2, 3, 4, 5])
 @pytest.mark.parametrize("shape", [(1, 1), (1, 9), (7, 1), (9, 11), (24, 31)])
@@ -72,7 +71,6 @@ def test_levels_are_exact(name: str, count: int, shape: tuple[int, int]) -> None
             assert abs(Fraction(float(levels[level][m, n])) - true) < 0.1
 
 
-@pytest.mark.sample(6)
 @pytest.mark.parametrize(("length", "unit"), [(1.0, 0.5), (1.3e-5, 2.0**-17)])
 @pytest.mark.parametrize("name", BASES)
 @pytest.mark.parametrize("loading", range(5))
@@ -102,7 +100,6 @@ def perturbed(seed: int, count: int) -> Array:
     return np.asarray(points * (1 + rng.choice([-1, 0, 1], points.shape) * 2.0**-53))
 
 
-@pytest.mark.sample(3)
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("slices", [2, 3, 4])
 def test_points_are_where_they_are(seed: int, slices: int) -> None:
@@ -148,7 +145,6 @@ def weight(place: float, node: int, order: int) -> Fraction:
     return result
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("order", [4, 12, 26])
 def test_values_within_the_reach_and_beyond(order: int) -> None:
     product = assembled(order, disc(np.random.default_rng(1), 60))
@@ -169,7 +165,6 @@ def test_values_within_the_reach_and_beyond(order: int) -> None:
     assert float(np.abs(head).max()) < 1
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("order", [4, 12, 26])
 @pytest.mark.parametrize("crowded", [False, True])
 def test_loads_on_nodes(order: int, crowded: bool) -> None:
@@ -205,7 +200,6 @@ def test_loads_on_nodes(order: int, crowded: bool) -> None:
     assert sharp._met(product) == met.max()
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("order", [4, 12, 26])
 def test_values_at_points(order: int) -> None:
     rng = np.random.default_rng(order)

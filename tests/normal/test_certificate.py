@@ -150,7 +150,6 @@ def test_scopes(kind: Kind) -> None:
         assert list(nothing.in_the_way) == [0, 1]
 
 
-@pytest.mark.sample(3)
 @pytest.mark.parametrize("operator", scenes.OPERATORS)
 @pytest.mark.parametrize("seed", range(20))
 def test_the_box_is_as_convex_as_it_says(seed: int, operator: Kind) -> None:
@@ -185,7 +184,6 @@ def test_the_convex_margin_is_a_lower_bound(seed: int, size: float) -> None:
     assert margin > 0 or smallest < 1.1e-3
 
 
-@pytest.mark.sample(5)
 @pytest.mark.parametrize("seed", range(40))
 def test_gaps_of_screened_neighbours_that_nearly_coincide(seed: int) -> None:
     """Where contact points are rounded, so is their distance."""

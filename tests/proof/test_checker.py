@@ -203,25 +203,20 @@ def test_each_end_of_each_bound_counts(few: Any, place: tuple[Any, ...]) -> None
 NUMBERS = ("0x1p+1", "0x1.8p-1", " 0x1.0000000000000p+0", "1.0", "nan", "inf", "0x1p99999", None)
 
 
-def test_numbers_are_written_one_way_and_nothing_is_left_unread(few: Any) -> None:
+def test_numbers_are_written_one_way_and_what_is_damaged_is_named(few: Any) -> None:
     for text in NUMBERS:
         reason = r"radii \[0\] \[0\]: .* not a finite float64"
         wrong(few, reason, checker.Unreadable, pressed__radii__0=[text])
-    for where in ((), ("claims",), ("argument",), ("pressed",)):
-        key = "__".join((*where, "note"))
-        wrong(few, "expected a table", checker.Unreadable, **{key: "believe me"})
-
-
-@pytest.mark.parametrize(
-    "place",
-    [
-        *("scene__tip_radii", "scene__contact_modulus", "argument__box", "argument__shells"),
-        *("argument__convexity_number", "pressed__radii", "sheared", "claims__gaps"),
-    ],
-)
-def test_what_is_damaged_is_named(few: Any, place: str) -> None:
-    name = place.replace("__", " ") if "claims" in place else place.split("__")[-1]
-    wrong(few, f"^{name}: ", checker.Unreadable, sha256="fits", **{place: "0x1.8"})
+    for where in ("note", "claims__note", "argument__note", "pressed__note"):
+        wrong(few, "expected a table", checker.Unreadable, **{where: "believe me"})
+    for place, name in (
+        *(("scene__tip_radii", "tip_radii"), ("scene__contact_modulus", "contact_modulus")),
+        *(("argument__box", "box"), ("argument__shells", "shells"), ("sheared", "sheared")),
+        *(("argument__convexity_number", "convexity_number"), ("pressed__radii", "radii")),
+        ("claims__gaps", "claims gaps"),
+    ):
+        damaged = {place: "0x1.8"}
+        wrong(few, f"^{name}: ", checker.Unreadable, sha256="fits", **damaged)
 
 
 def test_an_asperity_that_is_dragged_along_is_refused() -> None:

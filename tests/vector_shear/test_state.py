@@ -33,7 +33,6 @@ def found(name: str, nu: float, fraction: float, conic: bool = False) -> cr.Vect
     return shear_vector(contact, force=fraction * FRICTION * contact.load, solver=solver)
 
 
-@pytest.mark.sample(3)
 @pytest.mark.parametrize("fraction", [*FRACTIONS, 0.9999, 1 - 1e-9, 1.0])
 @pytest.mark.parametrize("name", NAMES)
 def test_without_poissons_ratio_it_is_ciavarella_and_jaeger(name: str, fraction: float) -> None:
@@ -54,7 +53,6 @@ def test_without_poissons_ratio_it_is_ciavarella_and_jaeger(name: str, fraction:
         assert (nearly.status == "partial").sum() == 1
 
 
-@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("nu", "fraction", "forces", "transverse", "travel", "sliding"),
     [
@@ -83,7 +81,6 @@ def test_the_error_of_the_papers_assumption(
     assert state.disagreement == pytest.approx(off, rel=1e-9)
 
 
-@pytest.mark.sample(2)
 @pytest.mark.parametrize("nu", [0.3, 0.5])
 @pytest.mark.parametrize("fraction", [0.99, 0.999, 0.9999, 1 - 1e-6, 1 - 1e-9, 1 - 1e-12])
 def test_close_to_gross_sliding(fraction: float, nu: float) -> None:
@@ -131,7 +128,6 @@ def test_where_order_fails_it_disagrees_with_what_shear_returns() -> None:
     assert_allclose(state.disagreement, apart / np.linalg.norm(other.forces), rtol=1e-12)
 
 
-@pytest.mark.sample(3)
 @pytest.mark.parametrize("fraction", [1e-40, *FRACTIONS, 0.9999])
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.5])
 def test_cones_and_newton_agree(nu: float, fraction: float) -> None:
@@ -155,7 +151,6 @@ def blunt(tip_radius: float) -> cr.Contact:
     return cr.press(scene, approach=PAPER_APPROACH)
 
 
-@pytest.mark.sample(3)
 @pytest.mark.parametrize("fraction", [1e-6, 0.2, 0.5, 0.9])
 @pytest.mark.parametrize("tip_radius", [0.3, 0.5])
 def test_five_cones(tip_radius: float, fraction: float) -> None:
@@ -257,7 +252,6 @@ def test_statuses_and_bounds_against_exact_states(
         return  # neither the oracle nor Newton's method is on trial
 
 
-@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("nu", [0.3, 0.5])
 def test_bounds_are_sharp_up_to_where_all_slide(name: str, nu: float) -> None:
@@ -268,7 +262,6 @@ def test_bounds_are_sharp_up_to_where_all_slide(name: str, nu: float) -> None:
         assert state.certificate.displacement_error < 1e4 * most * travel
 
 
-@pytest.mark.sample(2)
 @pytest.mark.parametrize("digits", [3, 8])
 @pytest.mark.parametrize("fraction", [1e-6, 0.37, 0.99])
 def test_doubt_about_the_loads_is_counted(fraction: float, digits: int) -> None:
