@@ -488,14 +488,3 @@ def test_point_error_is_counted() -> None:
         above = rough.falloff(loads, power)[:60]
         assert (above >= inverse_sums(far[:60], far, loads, power=power)[0]).all()
     assert (operator.separations() < ScatteredInfluence(points, SCALE).separations()).all()
-
-
-def test_presses_of_points_in_distant_clusters() -> None:
-    """Newton's method takes as few steps as for one cluster."""
-    rng = np.random.default_rng(10)
-    patch = np.stack(np.meshgrid(np.arange(30), np.arange(30)), -1).reshape(-1, 2)
-    patch = patch + rng.uniform(-0.3, 0.3, patch.shape)
-    far = np.array([[2e4, 1e4]])
-    for points in (np.vstack((patch, patch + far)), np.vstack((patch, far))):
-        scene = scenes.on_sphere(points, 10.0, radius=np.inf)
-        assert cr.press(scene, approach=0.02, influence="scattered").iterations <= 8

@@ -9,7 +9,7 @@ import pytest
 from flint import arb, ctx
 from multiprecision import exact, inverse_sum, middle, quotient
 from numpy.typing import NDArray
-from scenes import disc, lattice_operator, lattice_patch, loadings
+from scenes import LATTICES, disc, lattice_operator, lattice_patch, loadings
 
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair
@@ -21,11 +21,7 @@ from convexrough.influence.sliced import Distances, Sliced, cut
 from convexrough.influence.softened import Softened, exact_series
 from convexrough.influence.splitting import Splitting
 
-BASES = {
-    "hexagonal": [[1.0, 0.0], [0.5, 0.8660254037844386]],
-    "turned": [[0.9, 0.31], [-0.4, 1.1]],
-    "long": [[1.0, 0.02], [0.3, 37.0]],
-}
+BASES = LATTICES | {"long": [[1.0, 0.02], [0.3, 37.0]]}
 
 
 def sliced_on(

@@ -15,7 +15,7 @@ from scenes import PAPER_APPROACH, hexagonal, random_scenes, scattered, solve_ex
 from status_audit import ATTACKS, Tally, attack, audit_vectors
 
 import convexrough as cr
-from convexrough import FrictionConic, FrictionNewton, shear_vector
+from convexrough import FrictionConic, FrictionNewton, VectorShearState, shear_vector
 from convexrough.arithmetic.balls import Ball
 from convexrough.sphere import mindlin
 from convexrough.vector_shear import cones
@@ -27,9 +27,16 @@ NAMES = ["paper", "rough", "steel", "rough, closest"]
 
 
 @cache
-def found(name: str, nu: float, fraction: float, conic: bool = False) -> cr.VectorShearState:
-    contact = pressed(name, nu=nu)
-    solver = FrictionConic() if conic else None
+def contact_of(scene: str | float, nu: float) -> cr.Contact:
+    """A scene by its name, or the paper's with tips of this radius."""
+    if isinstance(scene, str):
+        return pressed(scene, nu=nu)
+    return cr.press(with_friction(hexagonal(tip_radius=scene), nu=nu), approach=PAPER_APPROACH)
+
+
+@cache
+def found(scene: str | float, nu: float, fraction: float, conic: bool = False) -> VectorShearState:
+    contact, solver = contact_of(scene, nu), FrictionConic() if conic else None
     return shear_vector(contact, force=fraction * FRICTION * contact.load, solver=solver)
 
 
@@ -145,25 +152,16 @@ def test_cones_and_newton_agree(nu: float, fraction: float) -> None:
     assert (newton.solver, conic.solver) == ("newton", "conic")
 
 
-@cache
-def blunt(tip_radius: float) -> cr.Contact:
-    scene = with_friction(hexagonal(tip_radius=tip_radius), nu=0.5)
-    return cr.press(scene, approach=PAPER_APPROACH)
-
-
 @pytest.mark.parametrize("fraction", [1e-6, 0.2, 0.5, 0.9])
 @pytest.mark.parametrize("tip_radius", [0.3, 0.5])
 def test_five_cones(tip_radius: float, fraction: float) -> None:
-    contact = blunt(tip_radius)
-    assert 21 / 25 < contact.cached(FrictionProblem).share < 1
-    force = fraction * FRICTION * contact.load
-    newton = shear_vector(contact, force=force)
-    conic = shear_vector(contact, force=force, solver=FrictionConic())
+    assert 21 / 25 < contact_of(tip_radius, 0.5).cached(FrictionProblem).share < 1
+    newton, conic = (found(tip_radius, 0.5, fraction, each) for each in (False, True))
     assert lengths(newton.forces - conic.forces).max() < 1e-6 * lengths(newton.forces).max()
 
 
 def test_too_dense_for_a_convex_program() -> None:
-    contact = blunt(5.0)
+    contact = contact_of(5.0, 0.5)
     assert contact.crowding > 1
     force = 0.1 * FRICTION * contact.load
     expected = (
