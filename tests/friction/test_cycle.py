@@ -38,7 +38,6 @@ def test_reference_losses_of_the_papers_example() -> None:
     assert above.loss_normalised > above.smooth_normalised
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", NAMED)
 def test_three_ways_to_the_energy(name: str) -> None:
     """Asperity by asperity; the trapezoid error of the indentation curve; the area of the loop."""
@@ -106,7 +105,6 @@ def test_history_energy_is_the_area(fractions: list[float]) -> None:
     assert (np.diff(path.losses) >= -1e-12 * path.losses[-1]).all()
 
 
-@pytest.mark.sample(3)
 @pytest.mark.parametrize("influence", KINDS)
 @pytest.mark.parametrize(("high", "low"), [(0.6, -0.6), (0.6, 0.2), (0.2, -0.8), (-0.3, -0.3)])
 def test_loops_are_the_history_that_they_stand_for(influence: str, high: float, low: float) -> None:
@@ -167,7 +165,6 @@ def test_amplitudes_of_forces_that_differ_by_a_last_bit() -> None:
         assert apart <= many.displacement_error + two.displacement_error
 
 
-@pytest.mark.sample(2)
 @pytest.mark.parametrize(("high", "low"), [(0.3, -0.3), (0.6, -0.6), (0.2, -0.7), (0.8, 0.1)])
 def test_tractions_are_those_of_the_field_and_slip_costs_the_energy(
     high: float, low: float

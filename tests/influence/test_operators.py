@@ -297,7 +297,6 @@ def test_far_from_the_origin_rounded_points_are_no_lattice() -> None:
     assert (contact.influence, contact.certificate.scope) == ("dense", "global")
 
 
-@pytest.mark.sample(20)
 @pytest.mark.parametrize("seed", range(60))
 def test_shells_do_not_overlap(seed: int) -> None:
     """The premise of the shell lemma: s_i + s_j <= r_ij for all pairs, touching or not."""
@@ -347,7 +346,6 @@ def assert_gaps_known(problem: NormalProblem, loads: Array, limit: float) -> Non
     assert found.gap.radius.max() < limit
 
 
-@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ("geometry", "R"), [("summit", 1.0), ("closest", 1.0), ("closest", (0.3, np.inf))]
 )

@@ -217,7 +217,6 @@ def test_nothing_where_the_smooth_sphere_would_touch(prescribed: dict[str, Any])
     assert cr.press(scenes.on_sphere(positions, heights=6e-5), **prescribed).certificate.all_proved
 
 
-@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     "rough",
     [
