@@ -270,7 +270,6 @@ def test_a_displacement_at_gross_sliding_or_just_below() -> None:
         cr.shear(contact, displacement=1.001 * gross.displacement)
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize("points", [ONE, TWO])
 def test_three_ways_to_one_path(points: list[tuple[float, float]]) -> None:
     scene, P, Q = path_of("paper", points)
