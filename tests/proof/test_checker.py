@@ -213,7 +213,7 @@ def test_numbers_are_written_one_way_and_what_is_damaged_is_named(few: Any) -> N
         *(("scene__tip_radii", "tip_radii"), ("scene__contact_modulus", "contact_modulus")),
         *(("argument__box", "box"), ("argument__shells", "shells"), ("sheared", "sheared")),
         *(("argument__convexity_number", "convexity_number"), ("pressed__radii", "radii")),
-        ("claims__gaps", "claims gaps"),
+        *(("claims__gaps", "claims gaps"), ("claims__load", "claims load")),
     ):
         damaged = {place: "0x1.8"}
         wrong(few, f"^{name}: ", checker.Unreadable, sha256="fits", **damaged)
