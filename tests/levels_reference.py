@@ -20,8 +20,8 @@ from multiprecision import (
     cube_root,
     exact,
     mid,
+    newton,
     slide,
-    solve_linear,
     travel_of,
 )
 
@@ -85,10 +85,7 @@ class Oracle:
         self.inner = self.A[np.ix_(on, on)]
         problem = NormalMap(self.inner, law[on], self.offsets[on], s.control, s.by_load, arb(1))
         x = mid(np.append(law[on] * cube_root(loads[on]) ** 2, arb(start.approach)))
-        for _ in range(3 if isinstance(start, Oracle) else 7):
-            x = mid(x - solve_linear(problem.jacobian(x), problem.residual(x), "approx"))
-        defect = max(abs(problem.residual(x)[:-1]), default=arb(0))
-        assert defect < abs(x[-1]) * arb(10) ** (15 - DIGITS)
+        x = newton(problem, x, tolerance=abs(x[-1]) * arb(10) ** (10 - DIGITS))
         self.P, self.approach = problem.loads(x), x[-1]
         self.load = self.P.sum() if len(self.P) else arb(0)
         self.loads, self.thresholds = (np.full(len(law), arb(0)) for _ in range(2))

@@ -354,18 +354,12 @@ def solve_linear(matrix: Balls, right: Balls, algorithm: Literal["approx"] | Non
 # Friction with the full tangential kernel
 
 
-@dataclass(frozen=True)
-class VectorReference:
-    """A proved state of the loaded asperities; every ball contains the true value.
+class VectorReference(NamedTuple):
+    """A proved state of the loaded asperities; every ball contains the true value."""
 
-    forces : (n, 2) over f [force];  slips : (n, 2) over c_t f [length]
-    displacement : (2,) X over c_t f [length]
-    sliding : (n,)
-    """
-
-    forces: Balls
-    slips: Balls
-    displacement: Balls
+    forces: Balls  # (n, 2) over f [force]
+    slips: Balls  # (n, 2) over c_t f [length]
+    displacement: Balls  # (2,) X over c_t f [length]
     sliding: list[bool]
 
 
@@ -386,7 +380,7 @@ class VectorMap:
             raise NotProved("a displacement may be zero")
         share = length / self.thresholds[i]
         if share > 1:
-            size, slope = self.loads[i], arb(0)
+            size, slope = self.loads[i], ZERO
         elif share < 1:
             root = (1 - share).sqrt()
             size = self.loads[i] * (1 - root**3)
@@ -394,7 +388,7 @@ class VectorMap:
         else:
             raise NotProved("an asperity slides or sticks, by less than its ball")
         along = np.outer(eta, eta) / (length * length)
-        across = np.array([[arb(1), arb(0)], [arb(0), arb(1)]]) - along
+        across = exact(np.eye(2)) - along
         return size / length * eta, slope * along + size / length * across
 
     def forces(self, x: Balls) -> tuple[Balls, Balls]:
@@ -410,12 +404,11 @@ class VectorMap:
 
     def jacobian(self, x: Balls) -> Balls:
         n, slopes = len(self.loads), self.forces(x)[1]
-        stiff, together = np.full((2 * n, 2 * n), arb(0)), exact(np.tile(np.eye(2), (n, 1)))
-        for i, slope in enumerate(slopes):
-            stiff[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = slope
-        own = self.kernel @ stiff + exact(np.eye(2 * n))
-        balance = self.unit * (together.T @ stiff)
-        return np.block([[own, -together], [balance, np.full((2, 2), arb(0))]])
+        columns = self.kernel.reshape(2 * n, n, 2)  # those of each asperity
+        own = np.concatenate([columns[:, i] @ slope for i, slope in enumerate(slopes)], axis=1)
+        balance = self.unit * np.concatenate(slopes, axis=1)
+        together, none = exact(np.tile(np.eye(2), (n, 1))), np.full((2, 2), ZERO)
+        return np.block([[own + exact(np.eye(2 * n)), -together], [balance, none]])
 
 
 def solve_vectors(

@@ -178,34 +178,25 @@ def excess(scene: cr.Scene, loads: Array, exact: Any, total: float | None = None
 
 def attack(kind: str, loads: Array, rng: np.random.Generator) -> Array:
     """Wrong loads: each a mistake that a user or a solver could make."""
-    wrong = loads.copy()
-    loaded = np.flatnonzero(loads)
-    if kind == "dropped" and len(loaded):
-        wrong[rng.choice(loaded)] = 0.0
-    elif kind == "smallest dropped" and len(loaded):
-        wrong[loaded[np.argmin(loads[loaded])]] = 0.0
-    elif kind == "added":
-        wrong[rng.integers(len(loads))] += loads.max() * 10.0 ** rng.uniform(-16, 0)
-    elif kind == "perturbed":
-        wrong *= 1 + 10.0 ** rng.uniform(-15, -1) * rng.standard_normal(len(loads))
-        wrong = np.maximum(wrong, 0.0)
-    elif kind == "swapped":
-        i, j = rng.integers(len(loads), size=2)
-        wrong[[i, j]] = wrong[[j, i]]
-    elif kind == "zero":
-        wrong[:] = 0.0
-    elif kind == "random":
-        wrong = loads.max() * rng.random(len(loads)) ** 4
-    elif kind == "huge":
-        wrong = loads * 1e6
-    elif kind == "scaled":
-        wrong = loads * (1 + rng.uniform(-0.1, 0.1))
-    elif kind == "rounded":
-        digits = int(rng.integers(1, 16))
-        wrong = np.array([float(f"{load:.{digits}e}") for load in loads])
-    elif kind == "single precision":
-        wrong = loads.astype(np.float32).astype(np.float64)
-    return wrong
+    places, loaded = np.arange(len(loads)), np.flatnonzero(loads)
+    (i, j), digits = rng.integers(len(loads), size=2), int(rng.integers(1, 16))
+    added, off = 10.0 ** rng.uniform([-16, -15], [0, -1])
+    smallest = loaded[np.argsort(loads[loaded])]
+    kinds = {
+        "none": loads.copy(),
+        "dropped": np.where(np.isin(places, rng.permutation(loaded)[:1]), 0.0, loads),
+        "smallest dropped": np.where(np.isin(places, smallest[:1]), 0.0, loads),
+        "added": loads + added * loads.max() * (places == i),
+        "perturbed": np.maximum(loads * (1 + off * rng.standard_normal(len(loads))), 0.0),
+        "swapped": loads[np.where(places == i, j, np.where(places == j, i, places))],
+        "zero": 0.0 * loads,
+        "random": loads.max() * rng.random(len(loads)) ** 4,
+        "huge": loads * 1e6,
+        "scaled": loads * rng.uniform(0.9, 1.1),
+        "rounded": np.array([float(f"{load:.{digits}e}") for load in loads]),
+        "single precision": loads.astype(np.float32).astype(np.float64),
+    }
+    return kinds[kind]
 
 
 ATTACKS = (

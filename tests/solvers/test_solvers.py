@@ -104,10 +104,8 @@ def test_wrong_loads_are_not_returned(factor: float, monkeypatch: pytest.MonkeyP
 
 def test_too_large_for_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     """Refused before anything is made."""
-    import psutil
-
-    problem = NormalProblem.assemble(paper(), approach=PAPER_APPROACH)
-    monkeypatch.setattr(psutil, "virtual_memory", lambda: SimpleNamespace(available=2**30))
+    problem = problem_of(paper(), PAPER_APPROACH)
+    monkeypatch.setattr("psutil.virtual_memory", lambda: SimpleNamespace(available=2**30))
     boxes = replace(ConeBoxes.choose(problem), members=np.arange(10**5))
     with pytest.raises(cr.InputError, match=r"asperities of the cone program: found 1e\+05"):
         lifted_program(problem, boxes)
@@ -132,24 +130,19 @@ def finer(k: float, within: float = 0.01, **rough: Any) -> cr.Scene:
     return hexagonal(0.0025 / k, 0.02 / k, within, **rough)
 
 
-def edited(
-    whole: cr.Scene, *, kept: Any = slice(None), shift: Any = 0.0, raised: Any = 0.0
-) -> cr.Scene:
-    """Some of the asperities, moved sideways and up."""
-    a = whole.asperities
-    some = cr.Asperities(a.positions[kept] + shift, a.tip_radii[kept], (a.heights + raised)[kept])
-    return replace(whole, asperities=some)
+def edited(whole: cr.Scene, *, most: float = 0.0, raised: Any = 0.0) -> cr.Scene:
+    """Each asperity moved sideways at random, and up."""
+    a, rng = whole.asperities, np.random.default_rng(6)
+    places = a.positions + rng.uniform(-most, most, (len(whole), 2))
+    return replace(whole, asperities=cr.Asperities(places, a.tip_radii, a.heights + raised))
 
 
 def sparse(whole: cr.Scene) -> cr.Scene:
-    rng = np.random.default_rng(5)
-    near = whole.asperities.distances < 3e-3  # where a lattice is looked for
-    return edited(whole, kept=near | (rng.random(len(whole)) < 0.6))
-
-
-def scattered(whole: cr.Scene) -> cr.Scene:
-    shift = np.random.default_rng(6).uniform(-5e-5, 5e-5, (len(whole), 2))
-    return edited(whole, shift=shift)
+    a, rng = whole.asperities, np.random.default_rng(5)
+    near = a.distances < 3e-3  # where a lattice is looked for
+    kept = near | (rng.random(len(whole)) < 0.6)
+    few = cr.Asperities(a.positions[kept], a.tip_radii[kept], a.heights[kept])
+    return replace(whole, asperities=few)
 
 
 #: Scenes of 1000 to 3500 candidates, each in the convex range.
@@ -159,7 +152,7 @@ LARGE = {
     "closest": replace(finer(6, height_std=1e-6, seed=3), geometry="closest"),
     "screened": finer(6, within=0.02, height_std=1e-7, seed=4),
     "sparse": sparse(finer(7, height_std=1e-7, seed=4)),
-    "scattered": scattered(finer(6, height_std=1e-6, seed=2)),
+    "scattered": edited(finer(6, height_std=1e-6, seed=2), most=5e-5),
     "flat": replace(edited(finer(6, height_std=1e-6, seed=2), raised=-5e-5), sphere_radius=np.inf),
 }
 
@@ -192,9 +185,6 @@ def test_as_through_the_matrix(name: str, kind: Kind, control: str) -> None:
     assert contact.approach == pytest.approx(PAPER_APPROACH, rel=1e-12)
     assert contact.crowding == pytest.approx(dense.crowding, rel=1e-9)
     assert contact.model_error == pytest.approx(dense.model_error, rel=0.03)
-    problem = NormalProblem.assemble(pressed, approach=PAPER_APPROACH, influence="dense")
-    loads, reached = contact.loads[problem.candidates], contact.approach / problem.units.length
-    assert problem.residual(loads / problem.units.force, reached) <= 1e-12 * reached
 
 
 @pytest.mark.sample(1)
