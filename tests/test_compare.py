@@ -205,49 +205,37 @@ def test_command_when_a_solver_fails_and_on_a_contradiction(command: Any, monkey
 
 
 MINE = """
-from dataclasses import replace
 import numpy as np
 from convexrough.solvers import Newton, Solution
 print("on import")
 
 class Mine:
-    name = "mine"
+    name, refine = "mine", False
     def solve(self, problem, start=None):
         print("on solving")
         found = Newton().solve(problem)
-        return replace(found, loads=self.changed(found.loads), refine=False, trial=None)
+        loads = self.changed(found.loads)
+        return Solution.of(problem, loads, found.approach, 1, refine=self.refine)
     def changed(self, loads):
         return loads
 
 class Zero(Mine):
-    name = "zero"
-    def changed(self, loads):
-        return 0 * loads
+    name, changed = "zero", lambda self, loads: 0 * loads
 
 class Spurious(Mine):
-    name = "spurious"
-    def changed(self, loads):
-        return np.where(loads > 0, loads, 1e-4 * loads.max())
+    name, changed = "spurious", lambda self, loads: np.maximum(loads, 1e-4 * loads.max())
 
-class Ones:  # the loads of a solver are judged as they are
-    name = "newton"
-    refine = {}
-    def solve(self, problem, start=None):
-        D = problem.approach or 1.0
-        return Solution.of(problem, np.ones(len(problem)), D, 1, **self.refine)
-
-class Words(Ones):
-    name = "words"
-    def solve(self, problem, start=None):
-        return Solution.of(problem, ["1"] * len(problem), 1.0, 1)
+class Ones(Mine):  # the loads of a solver are judged as they are
+    name, changed = "newton", lambda self, loads: np.ones(len(loads))
 
 class Refined(Ones):
-    refine = {"refine": True}
+    refine = True
 
 class Far(Refined):  # loads from which no Newton step leads to smaller residuals
-    def solve(self, problem, start=None):
-        loads = np.where(np.arange(len(problem)) == 0, 1e9, 0.0)
-        return Solution.of(problem, loads, problem.approach, 1, refine=True)
+    changed = lambda self, loads: np.where(np.arange(len(loads)) == 0, 1e9, 0.0)
+
+class Words(Mine):
+    changed = lambda self, loads: ["1"] * len(loads)
 
 class NoSolver: ...
 class NoName:
@@ -260,51 +248,46 @@ class Needs:
 def test_a_solver_of_ones_own_by_its_name(command: Any, tmp_path: Path, monkeypatch: Any) -> None:
     monkeypatch.setattr(sys, "path", sys.path[:])
     broken = {"unlicensed": "raise RuntimeError('no licence')", "broken": "def ("}
-    for module, text in {"desk_solvers": MINE, **broken}.items():
+    for module, text in {"desk": MINE, **broken}.items():
         (tmp_path / f"{module}.py").write_text(text)
     (tmp_path / "scene.toml").write_text(scene_text())
-    ran = command("compare", "scene.toml", "--solver", "desk_solvers.Mine", "--json")
-    assert [each["solver"] for each in json.loads(ran.out)["compare"]] == ["newton", "mine"]
-    assert "on import\non solving\n" in ran.err
-    wrong = command("compare", "scene.toml", "--solver", "desk_solvers.Zero")
-    assert wrong.status == 3
-    assert "zero disagrees: its loads differ from those of newton by 1 of the largest" in wrong.err
-    wide = command("compare", "scene.toml", "--solver", "desk_solvers.Zero", "--within", "2")
-    assert wide.status == 0
-    assert "zero: 37 contacts differ from those of newton: one solver gives them more" in wide.err
-    spurious = command("compare", "scene.toml", "--solver", "desk_solvers.Spurious")
-    assert spurious.status == 0  # the loads are right to 1e-4, the claimed contacts are not
-    assert "spurious: 24 contacts differ from those of newton" in spurious.err
-    assert "same; 24 contacts differ" in spurious.out
-    for name, said in (
-        ("desk_solvers.Yours", "no attribute 'Yours'"),
+    one, two, three = ["newton", "mine"], ["newton", "newton (2)"], "newton + refinement"
+    for line, status, names, said in (
+        ("Mine", 0, one, "on import\non solving\n"),
+        ("Zero", 3, None, "zero disagrees: its loads differ from those of newton by 1 of the larg"),
+        ("Zero --within 2", 0, None, "zero: 37 contacts differ from those of newton: one solver"),
+        # The loads are right to 1e-4, the claimed contacts are not.
+        ("Spurious", 0, None, "spurious: 24 contacts differ from those of newton"),
+        ("Spurious", 0, None, "same; 24 contacts differ"),
+        ("Words", 4, None, "expected real numbers"),
+        ("Far", 3, two, ""),
+        ("Ones --solver desk.Refined", 3, [*two, three], ""),
+    ):
+        json_or_text = ["--json"] if names else []
+        ran = command("compare", "scene.toml", "--solver", *f"desk.{line}".split(), *json_or_text)
+        assert (ran.status, said in ran.err + ran.out) == (status, True), line
+        if names:
+            assert [each["solver"] for each in json.loads(ran.out)["compare"]] == names
+    for name, pattern in (
+        ("desk.Yours", "no attribute 'Yours'"),
         ("no_module.Mine", "No module named 'no_module'"),
-        ("desk_solvers.Needs", "missing 1 required .* of a solver that needs no arguments"),
-        ("desk_solvers.NoSolver", "found type NoSolver, expected one of .* and a method `solve`"),
-        ("desk_solvers.NoName", "found type NoName, expected one of .* a text `name`"),
+        ("desk.Needs", "missing 1 required .* of a solver that needs no arguments"),
+        ("desk.NoSolver", "found type NoSolver, expected one of .* and a method `solve`"),
+        ("desk.NoName", "found type NoName, expected one of .* a text `name`"),
         ("newtom", "found 'newtom', expected one of"),
         ("unlicensed.Solver", r"found unlicensed.Solver \(Run"),
         ("broken.Solver", r"found broken.Solver \(Syn"),
     ):
         wrong = command("compare", "scene.toml", "--solver", name)
         assert (wrong.status, wrong.out) == (2, "")
-        assert re.search(said, wrong.err)
-    words = command("compare", "scene.toml", "--solver", "desk_solvers.Words")
-    assert "expected real numbers" in words.out
-    profiled = command("gallery", "--profile", "few", "--solver", "desk_solvers.Mine", "--json")
-    assert [each["solver"] for each in json.loads(profiled.out)["profile"]] == ["newton", "mine"]
-    assert profiled.status == 0
-    mine = json.loads(profiled.out)["profile"][1]
-    assert mine["right"] == mine["contact set right"] == len(mine["outcomes"]) > 0
-    both = [x for name in ("Ones", "Refined") for x in ("--solver", f"desk_solvers.{name}")]
-    far = command("compare", "scene.toml", "--solver", "desk_solvers.Far", "--json")
-    assert [each["solver"] for each in json.loads(far.out)["compare"]] == ["newton", "newton (2)"]
-    names = ["newton", "newton (2)", "newton + refinement"]
-    ran = command("compare", "scene.toml", *both, "--json")
-    assert ran.status == 3
-    assert [each["solver"] for each in json.loads(ran.out)["compare"]] == names
-    profiled = command("gallery", "--profile", "few", *both, "--json")
-    assert profiled.status == 3
-    profile = json.loads(profiled.out)["profile"]
-    assert [each["solver"] for each in profile] == names
-    assert [bool(each["right"]) for each in profile] == [True, False, True]
+        assert re.search(pattern, wrong.err)
+    asked = (
+        "gallery few --json --profile --solver desk.Mine --solver desk.Ones --solver desk.Refined"
+    )
+    ran = command(*asked.split())
+    profile = json.loads(ran.out)["profile"]
+    assert (ran.status, [each["solver"] for each in profile]) == (3, [*one, two[1], three])
+    count = len(profile[0]["outcomes"])
+    assert [each["right"] for each in profile] == [count, count, 0, count]
+    assert profile[1]["contact set right"] == count > 0
+    assert command(*asked.split()[:6]).status == 0
