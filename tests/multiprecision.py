@@ -484,14 +484,9 @@ def false_claims(document: Any) -> list[str]:
     ((control, value),) = document["prescribed"].items()
     with ctx.workdps(150):
         pressed = _solved(scene, document["pressed"]["radii"], {control: float.fromhex(value)})
-        false = _outside("approach", claims["approach"], pressed.approach)
-        false += _outside("load", claims["load"], pressed.load)
-        for i, status in enumerate(claims["status"]):
-            true = "contact" if pressed.loads[i] > 0 else "open"
-            if status not in (true, "undecided"):
-                false.append(f"asperity {i} is {true}, not {status}")
-            false += _outside(f"load {i}", claims["loads"][i], pressed.loads[i])
-            false += _outside(f"gap {i}", claims["gaps"][i], pressed.gaps[i])
+        touch = ["contact" if load > 0 else "open" for load in pressed.loads]
+        numbers = {"loads": pressed.loads, "gaps": pressed.gaps}
+        false = _false(claims, touch, approach=pressed.approach, load=pressed.load, **numbers)
         for state, claim in zip(document["sheared"], claims["shear"], strict=True):
             false += _false_shear(scene, pressed, state, claim)
     return false
@@ -500,25 +495,30 @@ def false_claims(document: Any) -> list[str]:
 def _false_shear(scene: Any, pressed: Reference, state: Any, claim: Any) -> list[str]:
     """The friction state by Ciavarella and Jaeger's theorem, and the loss of its cycle."""
     f, nu, force = (_number(x) for x in (scene["friction"], scene["poisson_ratio"], state["force"]))
-    held = _solved(scene, state["held"]["radii"], {"load": pressed.load - force / f})
-    slid = slide(f, nu, pressed, held)
-    false = _outside("displacement", claim["displacement"], slid.displacement)
-    for i, status in enumerate(claim["status"]):
-        P, p = pressed.loads[i], held.loads[i]
-        if p > P:
-            false.append(f"the theorem does not hold at asperity {i}")
-        true = "open" if not P > 0 else "partial" if p > 0 else "sliding"
-        if status not in (true, "undecided"):
-            false.append(f"asperity {i} is {true}, not {status}")
-        false += _outside(f"force {i}", claim["forces"][i], slid.forces[i])
-        false += _outside(f"slip {i}", claim["slips"][i], slid.slips[i])
-    if claim["loss"] is None:
-        return false
-    between = _solved(scene, state["held"]["radii"], {"load": pressed.load - force / (2 * f)})
-    for low, middle, high in zip(held.loads, between.loads, pressed.loads, strict=True):
-        if not low <= middle <= high:
+    radii = state["held"]["radii"]
+    held = _solved(scene, radii, {"load": pressed.load - force / f})
+    slid, pairs = slide(f, nu, pressed, held), [*zip(pressed.loads, held.loads, strict=True)]
+    slides = ["open" if not P > 0 else "partial" if p > 0 else "sliding" for P, p in pairs]
+    numbers = {"forces": slid.forces, "slips": slid.slips, "displacement": slid.displacement}
+    false = ["the theorem does not hold"] if any(p > P for P, p in pairs) else []
+    if claim["loss"] is not None:
+        numbers["loss"] = slid.energy
+        between = _solved(scene, radii, {"load": pressed.load - force / (2 * f)}).loads
+        if not all(p <= middle <= P for middle, (P, p) in zip(between, pairs, strict=True)):
             false.append("a loss without order")
-    return false + _outside("loss", claim["loss"], slid.energy)
+    return false + _false(claim, slides, **numbers)
+
+
+def _false(claim: Any, statuses: list[str], **numbers: Balls) -> list[str]:
+    """Statuses that are others, and numbers outside their intervals."""
+    told = enumerate(zip(claim["status"], statuses, strict=True))
+    false = [f"{i} is {it}, not {say}" for i, (say, it) in told if say not in (it, "undecided")]
+    for name, true in numbers.items():
+        ends = np.reshape(claim[name], (-1, 2))
+        for (low, high), it in zip(ends, np.atleast_1d(true), strict=True):
+            if not _number(low) <= it <= _number(high):
+                false.append(f"{name}: {it} is outside its bounds")
+    return false
 
 
 def _solved(scene: Any, radii: list[list[str]], control: Any) -> Reference:
@@ -539,8 +539,3 @@ def _solved(scene: Any, radii: list[list[str]], control: Any) -> Reference:
 
 def _number(text: str) -> arb:
     return arb(float.fromhex(text))
-
-
-def _outside(what: str, bounds: list[str], true: arb) -> list[str]:
-    low, high = (_number(text) for text in bounds)
-    return [] if low <= true <= high else [f"{what} is {true}, outside its bounds"]
