@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 from scene_files import HEXAGONAL, scene_text
@@ -18,16 +19,21 @@ TESTS, BATCH = Path(__file__).parent.parent, 18
 forks = pytest.mark.skipif(not hasattr(os, "fork"), reason="trials are forked processes")
 
 
-def printed(program: str, *numbers: int) -> list[str]:
-    """By a program of the tests, in a process of its own, without the threads of this one."""
-    path = os.pathsep.join([str(TESTS.parent), str(TESTS)])
+def python(*arguments: str, **options: Any) -> tuple[int, str, str]:
+    """Status and output of a process of its own, without the threads of this one."""
     done = subprocess.run(
-        [sys.executable, str(TESTS / program), *map(str, numbers)],
-        env=os.environ | {"PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"},
-        capture_output=True, text=True, check=False, timeout=3600,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr[-2000:]
-    return done.stdout.splitlines()
+        [sys.executable, *arguments], capture_output=True, text=True, check=False, **options
+    )
+    return done.returncode, done.stdout, done.stderr
+
+
+def printed(program: str, *numbers: int) -> list[str]:
+    """By a program of the tests."""
+    path = os.pathsep.join([str(TESTS.parent), str(TESTS)])
+    env = os.environ | {"PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"}
+    status, out, err = python(str(TESTS / program), *map(str, numbers), env=env, timeout=3600)
+    assert status == 0, err[-2000:]
+    return out.splitlines()
 
 
 @forks
@@ -51,20 +57,17 @@ def test_mutants(pytestconfig: pytest.Config) -> None:
 
 
 @forks
-def test_what_a_killed_process_left_is_removed_by_the_next(tmp_path: Path, command: object) -> None:
+def test_what_a_killed_process_left_is_removed_by_the_next(tmp_path: Path, command: Any) -> None:
     """And of one that still runs, or of the user, nothing."""
     (tmp_path / "a.toml").write_text(scene_text())
     folder = tmp_path / "out"
     folder.mkdir()
-    ended = subprocess.Popen([sys.executable, "-c", ""])
-    ended.wait()
-    left = folder / f".summary.json.{ended.pid}.unfinished"
-    left.write_text("{")
-    assert command("run", "a.toml", "--out", "out", "--no-figures").status == 0  # type: ignore
-    assert not left.exists()
-    left.write_text("{")
-    assert command("new", "out/b.toml").status == 0  # type: ignore
-    assert not left.exists()
+    ended = python("-c", "import os; print(os.getpid())")[1].strip()
+    left = folder / f".summary.json.{ended}.unfinished"
+    for line in ("run a.toml --out out --no-figures", "new out/b.toml"):
+        left.write_text("{")
+        assert command(*line.split()).status == 0
+        assert not left.exists()
     kept = [folder / f".a.{os.getpid()}.unfinished", folder / ".a.1.unfinished.txt", folder / ".a"]
     for path in kept:
         path.write_text("mine")
@@ -76,11 +79,8 @@ def test_what_a_killed_process_left_is_removed_by_the_next(tmp_path: Path, comma
 def test_new_on_a_full_disk_leaves_nothing(tmp_path: Path) -> None:
     limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100)); "
     code = limit + "from convexrough.cli import main; raise SystemExit(main(['new', 'a.toml']))"
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 2
-    assert done.stderr == "convexrough: error: a.toml: cannot be written: File too large\n"
+    said = "convexrough: error: a.toml: cannot be written: File too large\n"
+    assert python("-c", code, cwd=tmp_path) == (2, "", said)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -91,19 +91,13 @@ START = (
 )
 
 
-def module(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "convexrough", *arguments]
-    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
-
-
 def test_exit_status_of_a_process(tmp_path: Path) -> None:
     (tmp_path / "good.toml").write_text(scene_text())
-    good = module("run", "good.toml", "--json", "--no-figures", cwd=tmp_path)
-    assert (good.returncode, good.stderr) == (0, "")
-    json.loads(good.stdout)
-    bad = module("run", "none.toml", cwd=tmp_path)
-    assert (bad.returncode, bad.stdout) == (2, "")
-    assert "Traceback" not in bad.stderr
+    run = ("-m", "convexrough", "run")
+    status, out, err = python(*run, "good.toml", "--json", "--no-figures", cwd=tmp_path)
+    assert (status, json.loads(out)["normal"]["contact"], err) == (0, 37, "")
+    status, out, err = python(*run, "none.toml", cwd=tmp_path)
+    assert (status, out, "Traceback" in err) == (2, "", False)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["good-results", "good.toml"]
 
 
@@ -111,8 +105,7 @@ def test_a_line_is_completed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) ->
     monkeypatch.setenv("_CONVEXROUGH_COMPLETE", "bash_complete")
     monkeypatch.setenv("COMP_WORDS", "convexrough run --pr")
     monkeypatch.setenv("COMP_CWORD", "2")
-    done = module(cwd=tmp_path)
-    assert (done.returncode, done.stdout.split(), done.stderr) == (0, ["plain,--proof"], "")
+    assert python("-m", "convexrough", cwd=tmp_path) == (0, "plain,--proof\n", "")
 
 
 def test_an_interrupt_while_an_object_is_freed(tmp_path: Path) -> None:
@@ -127,8 +120,7 @@ def test_an_interrupt_while_an_object_is_freed(tmp_path: Path) -> None:
         "program._status = status\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler); sys.exit(main())"
     )
-    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert (ran.returncode, ran.stderr) == (130, "convexrough: interrupted\n")
+    assert python("-c", code) == (130, "", "convexrough: interrupted\n")
 
 
 @pytest.mark.sample(1)
