@@ -102,25 +102,15 @@ def solve(
         points, shape, law = of_scene(scene)
         influence = coupling(points, arb(float(scene.material.contact_modulus)))
 
-        # A P >= 0, so an asperity with D_i <= 0 cannot touch: it is left out of the equations.
-        able = np.full(len(shape), True) if by_load else ~(shape + control <= 0)
-        if by_load:  # u: the indentation of one asperity, or the largest prescribed D_i
-            unit = (law[0] * (control * control).root(3)).mid()
-        else:
-            unit = max((shape + control)[able], default=ONE).mid()
-        problem = NormalMap(
-            influence[np.ix_(able, able)], law[able], shape[able], control, by_load, unit
-        )
-        first = problem.begin(None if start is None else exact(start)[able])
+        # u: the indentation of one asperity, or the largest prescribed D_i
+        alone = law[0] * (control * control).root(3) if by_load else (shape + control).max()
+        unit = abs(alone).mid()
+        problem = NormalMap(influence, law, shape, control, by_load, unit)
+        first = problem.begin(None if start is None else exact(start))
         point = newton(problem, first, tolerance=unit / arb(10) ** (digits + 20))
         state = prove(problem, point, radius=unit / arb(10) ** (digits + 10))
-
-        loads = np.full(len(shape), ZERO)
-        loads[able] = problem.loads(state)
-        depth = state[-1] if by_load else control
+        loads, depth = problem.loads(state), state[-1] if by_load else control
         gaps = np.where(loads > 0, ZERO, influence @ loads - shape - depth)
-        if not ((loads > 0) | (gaps > 0)).all():
-            raise NotProved("an asperity grazes: neither its load nor its gap is positive")
         if any(ball.rel_accuracy_bits() < digits * log2(10) for ball in (*loads, *gaps)):
             raise NotProved("an asperity nearly grazes and lost significance: ask for more digits")
         total = control if by_load else loads.sum(initial=ZERO)
