@@ -6,8 +6,9 @@ Comparisons are in exact arithmetic, so that a bound too small by a roundoff is 
 """
 
 import sys
+from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 
 import multiprecision
@@ -38,20 +39,15 @@ class Wrong(AssertionError):
     """A status or a bound that is not true."""
 
 
-@dataclass
-class Tally:
-    """What was found, by kind of scene and stage."""
+class Tally(Counter[Any]):
+    """How many scenes were tried, refused, and unsolved by the oracle (or their vector states).
 
-    scenes: int = 0
-    refused: int = 0
-    unsolved: int = 0  # by the oracle, which needs both signs of every gap
-    unsolved_vectors: int = 0  # states with the full tangential kernel
-    statuses: dict[tuple[str, str], list[int]] = field(default_factory=dict)
+    And statuses, and those of them that are undecided, by kind of scene and stage.
+    """
 
     def count(self, kind: str, stage: str, statuses: Any) -> None:
-        seen = self.statuses.setdefault((kind, stage), [0, 0])
-        seen[0] += len(statuses)
-        seen[1] += int((statuses == "undecided").sum())
+        self[kind, stage] += len(statuses)
+        self[kind, stage, "undecided"] += int((statuses == "undecided").sum())
 
 
 def require(holds: Any, message: str) -> None:
@@ -120,15 +116,15 @@ def audit(seeds: Iterator[int] | range) -> Tally:
     """Raises Wrong at the first wrong status or bound, with the seed of its scene."""
     tally = Tally()
     for seed in seeds:
-        tally.scenes += 1
+        tally["tried"] += 1
         try:
             _audit_scene(seed, tally)
         except Wrong as wrong:
             raise Wrong(f"seed {seed}: {wrong}") from wrong
         except multiprecision.NotProved:
-            tally.unsolved += 1
+            tally["unsolved"] += 1
         except (cr.InputError, cr.SolverError):
-            tally.refused += 1
+            tally["refused"] += 1
     return tally
 
 
@@ -177,13 +173,12 @@ def excess(scene: cr.Scene, loads: Array, exact: Any, total: float | None = None
 
 
 def attack(kind: str, loads: Array, rng: np.random.Generator) -> Array:
-    """Wrong loads: each a mistake that a user or a solver could make."""
+    """Wrong loads: each a mistake that a user or a solver could make; of other kinds the same."""
     places, loaded = np.arange(len(loads)), np.flatnonzero(loads)
     (i, j), digits = rng.integers(len(loads), size=2), int(rng.integers(1, 16))
     added, off = 10.0 ** rng.uniform([-16, -15], [0, -1])
     smallest = loaded[np.argsort(loads[loaded])]
     kinds = {
-        "none": loads.copy(),
         "dropped": np.where(np.isin(places, rng.permutation(loaded)[:1]), 0.0, loads),
         "smallest dropped": np.where(np.isin(places, smallest[:1]), 0.0, loads),
         "added": loads + added * loads.max() * (places == i),
@@ -196,7 +191,7 @@ def attack(kind: str, loads: Array, rng: np.random.Generator) -> Array:
         "rounded": np.array([float(f"{load:.{digits}e}") for load in loads]),
         "single precision": loads.astype(np.float32).astype(np.float64),
     }
-    return kinds[kind]
+    return kinds.get(kind, loads.copy())
 
 
 ATTACKS = (
@@ -297,7 +292,7 @@ def audit_vectors(kind: str, tilted: cr.Contact, full: Any, pair: Any, tally: Ta
             tilted.scene, list(full.loads), pair, state.forces, state.displacement, DIGITS - 20
         )
     except multiprecision.NotProved:
-        tally.unsolved_vectors += 1
+        tally["unsolved vectors"] += 1
         return
     touching = [i for i, load in enumerate(full.loads) if load > 0]
     gross = np.isinf(state.displacement).any()  # Q counts as f P: all slide, with forces along Q
@@ -324,10 +319,14 @@ def _with_poisson(contact: cr.Contact, nu: float) -> cr.Contact:
 
 
 def report(tally: Tally) -> str:
-    beyond = f"{tally.unsolved} beyond the oracle, {tally.unsolved_vectors} of the vector states"
-    lines = [f"{tally.scenes:,} scenes, {tally.refused} refused, {beyond}"]
-    for key, (statuses, undecided) in sorted(tally.statuses.items()):
-        lines.append(f"{' '.join(key)}: {statuses:,}, {100 * undecided / statuses:.2f} % undecided")
+    lines = [
+        ", ".join(
+            f"{tally[it]:,} {it}" for it in ("tried", "refused", "unsolved", "unsolved vectors")
+        )
+    ]
+    for key in sorted(key for key in tally if len(key) == 2):
+        undecided = 100 * tally[*key, "undecided"] / tally[key]
+        lines.append(f"{' '.join(key)}: {tally[key]:,}, {undecided:.2f} % undecided")
     return "\n".join(lines)
 
 

@@ -91,16 +91,6 @@ START = (
 )
 
 
-def test_exit_status_of_a_process(tmp_path: Path) -> None:
-    (tmp_path / "good.toml").write_text(scene_text())
-    run = ("-m", "convexrough", "run")
-    status, out, err = python(*run, "good.toml", "--json", "--no-figures", cwd=tmp_path)
-    assert (status, json.loads(out)["normal"]["contact"], err) == (0, 37, "")
-    status, out, err = python(*run, "none.toml", cwd=tmp_path)
-    assert (status, out, "Traceback" in err) == (2, "", False)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["good-results", "good.toml"]
-
-
 def test_a_line_is_completed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("_CONVEXROUGH_COMPLETE", "bash_complete")
     monkeypatch.setenv("COMP_WORDS", "convexrough run --pr")
