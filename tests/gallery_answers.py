@@ -40,13 +40,9 @@ def answer(case: dict[str, Any]) -> dict[str, Any]:
     scene = cases.scene_of(case)
     contact = cr.press(scene, **case["prescribed"])
     full = solve_exactly(scene, **case["prescribed"], start=contact.loads, digits=DIGITS)
-    return {
-        "approach": digits(full.approach),
-        "load": digits(full.load),
-        "loads": [digits(load) for load in full.loads],
-        "gaps": [digits(gap) for gap in full.gaps],
-        **sheared(contact, full, case["shear_force"]),
-    }
+    totals = {"approach": digits(full.approach), "load": digits(full.load)}
+    each = {"loads": [*map(digits, full.loads)], "gaps": [*map(digits, full.gaps)]}
+    return totals | each | sheared(contact, full, case["shear_force"])
 
 
 def sheared(contact: cr.Contact, full: Any, force: float) -> dict[str, Any]:
@@ -56,11 +52,8 @@ def sheared(contact: cr.Contact, full: Any, force: float) -> dict[str, Any]:
             slid = slid_from(contact, full, force, DIGITS)
         except Dragged:
             return {"forces": [], "slips": [], "displacement": ""}
-        return {
-            "forces": [digits(each) for each in slid.forces],
-            "slips": [digits(each) for each in slid.slips],
-            "displacement": digits(slid.displacement),
-        }
+        forces, slips = ([*map(digits, each)] for each in (slid.forces, slid.slips))
+        return {"forces": forces, "slips": slips, "displacement": digits(slid.displacement)}
 
 
 def true_statuses(case: cr.gallery.HardCase, statuses: Any) -> bool:

@@ -1,10 +1,8 @@
 """A proved multiprecision solution of the normal contact of rough spheres: the test oracle.
 
-The binary values of float64 inputs are taken as exact numbers. The contact law
-
-    P >= 0,   g = k P^(2/3) + A P - d - D0 >= 0,   P_i g_i = 0
-
-is solved as its *normal map* F = 0, one equation for each asperity and one for the control,
+Float64 inputs are taken as exact numbers. The contact law
+P >= 0, g = k P^(2/3) + A P - d - D0 >= 0, P_i g_i = 0 is solved as its *normal map* F = 0, with
+an equation for each asperity and one for the control,
 
     delta + A P - d - D0 = 0,         P = (max(delta, 0) / k)^(3/2),
     D0 - approach = 0   or   u (sum P / load - 1) = 0,      u a length, so every row is a length,
@@ -61,21 +59,14 @@ class NotProved(ArithmeticError):
     """Newton did not arrive, or its answer could not be proved with this number of digits."""
 
 
-@dataclass(frozen=True)
-class Reference:
-    """A proved contact state: every ball contains the true value.
+class Reference(NamedTuple):
+    """A proved contact state: every ball contains the true value."""
 
-    loads : n normal loads [force]; exactly zero where the asperity is open
-    gaps : n gaps max(0, (A P)_i - D_i) [length]; exactly zero where the asperity touches
-    approach : D0, both bodies together [length];  load : the total, sum P [force]
-    thresholds : k P^(2/3) [length], which friction multiplies
-    """
-
-    loads: tuple[arb, ...]
-    gaps: tuple[arb, ...]
-    approach: arb
-    load: arb
-    thresholds: tuple[arb, ...]
+    loads: tuple[arb, ...]  # [force], exactly zero where the asperity is open
+    gaps: tuple[arb, ...]  # max(0, (A P)_i - D_i) [length], exactly zero where it touches
+    approach: arb  # D0, both bodies together [length]
+    load: arb  # the total, sum P [force]
+    thresholds: tuple[arb, ...]  # k P^(2/3) [length], which friction multiplies
 
 
 def solve(
@@ -89,12 +80,10 @@ def solve(
     """Solve one contact and prove it: all loads and gaps to `digits` significant digits.
 
     scene : a `Scene`, of which only what is given is read, or what has the same names
-    approach [length] or load [force] : what is prescribed, exactly one of the two
-    start : (n,) loads [force] to begin Newton at, such as an approximate solution
+    start : (n,) loads [force] to begin Newton at, which it may need if contact discs overlap
 
     Proved: a state exists in which exactly these asperities touch, and no other state is near it.
     That it is the only one anywhere follows if the energy is convex, which is not tested here.
-    Far from convex (overlapping contact discs) Newton may need a `start`, else raise NotProved.
     """
     by_load = load is not None
     with ctx.workdps(digits + GUARD_DIGITS):
@@ -120,19 +109,14 @@ def solve(
 
 @dataclass(frozen=True)
 class NormalMap:
-    """The map F of the module's docstring; its argument x = (delta_1, .., delta_m, D0) [length].
+    """The map F of the module's docstring; its argument x = (delta_1, .., delta_n, D0) [length]."""
 
-    influence : (m, m) A_ij [length / force]
-    law : (m,) k_i [length / force^(2/3)];  shape : (m,) d_i = D_i - D0 [length]
-    control : the load [force] where `by_load`, else the approach [length];  unit : u [length]
-    """
-
-    influence: Balls
-    law: Balls
-    shape: Balls
-    control: Balls
+    influence: Balls  # (n, n) A_ij [length / force]
+    law: Balls  # (n,) k_i [length / force^(2/3)]
+    shape: Balls  # (n,) d_i = D_i - D0 [length]
+    control: Balls  # the load [force] where `by_load`, else the approach [length]
     by_load: bool
-    unit: Balls
+    unit: Balls  # u [length]
 
     def begin(self, loads: Balls | None) -> Balls:
         """The state x of these loads; by default each alone (approach) or all equal (load)."""
@@ -266,17 +250,13 @@ def travel_of(f: arb, nu: arb) -> arb:
 
 
 class Friction(NamedTuple):
-    """A friction state of first loading, and the cycle of this amplitude: balls.
+    """A friction state of first loading, and the cycle of this amplitude: balls."""
 
-    forces, slips, displacement : Q_i [force], slip_i and X [length]
-    energies : lost in a cycle, by asperities [force length];  energy : their sum
-    """
-
-    forces: Balls
-    slips: Balls
-    displacement: Balls
-    energies: Balls
-    energy: Balls
+    forces: Balls  # Q_i [force]
+    slips: Balls  # slip_i [length]
+    displacement: Balls  # X [length]
+    energies: Balls  # lost in a cycle, by asperities [force length]
+    energy: Balls  # their sum
 
 
 def slide(f: arb, nu: arb, full: Any, held: Any) -> Friction:

@@ -148,22 +148,22 @@ def test_powers_of_two_scale_every_bit(name: str, length: float, modulus: float)
 
 
 def test_wrong_answers_are_judged_wrong() -> None:
-    case = gallery.case("grazing-load-1e-12")
-    loads = np.array([float(each) for each in case.loads])
-    assert case.check(loads).right
-    assert not case.check(0 * loads)
-    dropped = loads.copy()
-    dropped[-1] = 0.0
-    judged = case.check(dropped)
-    assert not judged.right
+    case, open_one = gallery.case("grazing-load-1e-12"), gallery.case("grazing-gap-1e-6")
+    loads, forces = (np.array(each, dtype=float) for each in (case.loads, open_one.forces))
+    judged = case.check(np.append(loads[:-1], 0.0))
     assert (judged.wrongly_open.tolist(), judged.wrongly_loaded.tolist()) == ([7], [])
+    off = loads * (1 + 2e-6)
+    for right in (case.check(loads), case.check(off, within=1e-5), open_one.check_shear(forces)):
+        assert right
+    for wrong in (
+        judged,
+        case.check(0 * loads),
+        case.check(off),
+        open_one.check_shear(forces[::-1]),
+    ):
+        assert not wrong
+        assert not wrong.right
     assert not case.check(loads, floor=2e-12 * loads.max()).right
-    assert not case.check(loads * (1 + 2e-6)).right
-    assert case.check(loads * (1 + 2e-6), within=1e-5).right
-    open_one = gallery.case("grazing-gap-1e-6")
-    forces = np.array([float(each) for each in open_one.forces])
-    assert open_one.check_shear(forces).right
-    assert not open_one.check_shear(forces[::-1]).right
 
 
 @pytest.mark.sample(2)
