@@ -156,7 +156,9 @@ def test_all_agree(command: Any, tmp_path: Path, normal: str) -> None:
 
 def test_command_with_a_log(command: Any, tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(scene_text())
-    assert command("compare", "a.toml", "--solver", "conic", "--log", "log.csv").status == 0
+    both = "compare a.toml --log log.csv --solver conic --solver conic_cvxpy"
+    ran = command(*both.split())
+    assert (ran.status, "\nconic in CVXPY + Newton step  " in ran.out) == (0, True)
     first, *rows = (tmp_path / "log.csv").read_text().splitlines()
     assert first == "solver,step,objective,residual"
     steps = [row.split(",") for row in rows]
