@@ -82,11 +82,12 @@ def put(value: float) -> Spoil:
 
 NO_LOADS: dict[str, Spoil] = {
     "nan": put(np.nan),
+    "inf": put(np.inf),
     "negative": put(-1e-3),
     "a little negative": put(-1e-25),
     "one too few": lambda loads, rng: loads[:-1],
     "huge": lambda loads, rng: loads * 1e300,
-    "statuses": lambda loads, rng: np.full(len(loads), "optimal"),
+    "complex": lambda loads, rng: loads * (1 + 1j),
 }
 
 CONTROLS = [{"approach": PAPER_APPROACH}, {"load": 2e-7}]
