@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -43,30 +44,27 @@ def unrefined(spoil: Callable[[Any], Any]) -> Liar:
     return Liar(lambda loads, rng: spoil(loads), more=(("refine", False),))
 
 
-@dataclass
-class Elsewhere:
-    """Newton's answer, with all its digits, for other loads or approaches from some call on."""
+def elsewhere(*factors: float) -> Any:
+    """Newton's answers, with all their digits, for other loads or approaches from call to call."""
+    remaining = iter(factors)
 
-    honest: int
-    factor: float
-    name: str = "elsewhere"
+    def solve(problem: Any, start: Any = None) -> Any:
+        control = problem.control * next(remaining, factors[-1])
+        return Newton().solve(replace(problem, control=control), start)
 
-    def solve(self, problem: Any, start: Any = None) -> Any:
-        self.honest -= 1
-        factor = self.factor if self.honest < 0 else 1.0
-        return Newton().solve(replace(problem, control=problem.control * factor), start)
+    return SimpleNamespace(name="elsewhere", solve=solve)
 
 
 @pytest.mark.parametrize("control", [{"approach": 3e-4}, {"load": 6e-6}], ids=["approach", "load"])
 def test_digits_of_another_problem_are_not_used(control: Any) -> None:
     scene = replace(hexagonal(spacing=1e-3, tip_radius=5e-3, within=0.0302), friction=0.5)
     true = cr.press(scene, **control)
-    found = cr.press(scene, **control, solver=Elsewhere(0, 0.9))
+    found = cr.press(scene, **control, solver=elsewhere(0.9))
     assert (found.status == true.status).all()
     assert found.load == pytest.approx(true.load, rel=1e-14)
     state, known = (
         cr.shear(contact, force=0.1 * true.load)
-        for contact in (cr.press(scene, **control, solver=Elsewhere(1, 1 + 1e-6)), true)
+        for contact in (cr.press(scene, **control, solver=elsewhere(1.0, 1 + 1e-6)), true)
     )
     bounds = state.certificate.force_errors + known.certificate.force_errors
     assert (np.abs(state.forces - known.forces) <= bounds).all()
@@ -164,17 +162,15 @@ def test_wrong_forces_are_never_called_right(field: str) -> None:
 def test_a_solver_cannot_change_what_the_proof_uses() -> None:
     """Such a change in place gave a bound of 5e-17 for loads that were 1.3 % off."""
 
-    class Scaling:
-        name = "scaling"
+    def solve(problem: Any, start: Any = None) -> Any:
+        problem.influence.points[...] *= 1.02
+        return Newton().solve(problem, start)
 
-        def solve(self, problem: Any, start: Any = None) -> Any:
-            problem.influence.points[...] *= 1.02
-            return Newton().solve(problem, start)
-
+    scaling: Any = SimpleNamespace(name="scaling", solve=solve)
     for kind in ("dense", "scattered"):  # a lattice computes its points anew
         scene = replace(paper(), geometry="closest")
         with pytest.raises(ValueError, match="read-only"):
-            cr.press(scene, approach=PAPER_APPROACH, solver=Scaling(), influence=kind)
+            cr.press(scene, approach=PAPER_APPROACH, solver=scaling, influence=kind)
     problem = NormalProblem.assemble(paper(), approach=PAPER_APPROACH)
     for each in (problem.offsets, problem.coefficients, problem.shells, problem.influence.matrix):
         assert not each.flags.writeable
