@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from friction_scenes import pressed
 from numpy.testing import assert_allclose
-from scenes import PAPER_APPROACH, paper
 from scipy.optimize import brentq
 
 import convexrough as cr
@@ -40,14 +40,9 @@ def cycle_energy(contact: cr.Contact, maximum: float) -> float:
     return float((limits * (scales * mindlin.loss(shares) + 4.0 * forwards)).sum())
 
 
-def pressed(nu: float) -> cr.Contact:
-    scene = cr.Scene(1.0, paper().asperities, cr.Material(1.0, nu), 0.5, geometry="summit")
-    return cr.press(scene, approach=PAPER_APPROACH)
-
-
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.5])
 def test_the_losses_cross_earlier_than_by_shear(nu: float) -> None:
-    contact = pressed(nu)
+    contact = pressed("paper", nu=nu)
     hertz = smooth(contact.scene, load=contact.load)
     limit = hertz.largest_force
 
@@ -64,7 +59,7 @@ def test_the_losses_cross_earlier_than_by_shear(nu: float) -> None:
 @pytest.mark.parametrize("fraction", [0.37, -0.8, 1.0])
 def test_at_poissons_ratio_0_slips_are_those_of_shear(fraction: float) -> None:
     """But for discs in place of points, an error of the displacements that slips are made of."""
-    contact = pressed(0.0)
+    contact = pressed("paper", nu=0.0)
     state = cr.shear(contact, force=fraction * 0.5 * contact.load)
     assert np.count_nonzero(state.slips) >= 6
     error = contact.model_error * abs(state.displacement)

@@ -1,5 +1,6 @@
 """Smooth spheres and ellipsoids, and the fields of asperities: quadrature, 60 digits, balances."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -23,20 +24,19 @@ LOAD, NU = 2e-6, 0.3
 PARTS = np.array([0.0, 0.25, 0.5, 0.95, 1.2])  # of the contact radius
 
 
-def sphere(friction: float | None = FRICTION, nu: float = NU) -> SmoothSphere:
-    scene = cr.Scene(RELATIVE, ALONE, cr.Material(3.0, nu), friction, geometry="summit")
+def sphere(nu: float = NU) -> SmoothSphere:
+    scene = cr.Scene(RELATIVE, ALONE, cr.Material(3.0, nu), FRICTION, geometry="summit")
     return smooth(scene, load=LOAD)
 
 
 @pytest.mark.parametrize("t", [0.6, -0.6, 1.0])
 def test_branches_are_those_of_a_history(t: float) -> None:
     """Of one asperity, on which a sphere is pressed: a smooth sphere of their relative radius."""
-    hertz, asperities = sphere(), cr.Asperities([(0.0, 0.0)], RHO)
-    scene = cr.Scene(R, asperities, cr.Material(3.0, NU), FRICTION, geometry="summit")
-    contact = cr.press(scene, load=LOAD)
+    hertz = sphere()
+    scene = replace(hertz.scene, sphere_radius=R, asperities=cr.Asperities([(0.0, 0.0)], RHO))
     turning = t * hertz.largest_force
     back = turning * np.linspace(1, -1, 9)
-    past = cr.history(contact, forces=back)
+    past = cr.history(cr.press(scene, load=LOAD), forces=back)
     X = hertz.branch(back, turning)
     assert_allclose(X, past.displacements, rtol=1e-12, atol=1e-13 * abs(X[0]))
     assert X[0] == pytest.approx(hertz.displacement(turning), rel=1e-14)
@@ -82,8 +82,7 @@ def test_sixty_digits(t: float, nu: float) -> None:
 
 
 def ellipsoid(radii: Any, load: float, nu: float = 0.3) -> SmoothEllipsoid:
-    scene = cr.Scene(radii, ALONE, cr.Material(3.0, nu), friction=0.4, geometry="summit")
-    found = cr.smooth(scene, load=load)
+    found = cr.smooth(replace(sphere(nu).scene, sphere_radius=radii), load=load)
     assert isinstance(found, SmoothEllipsoid)
     return found
 
@@ -109,15 +108,10 @@ def test_semi_axes_and_approach_by_legendres_integrals(radii: tuple[float, float
 def test_loss_is_eight_times_the_error_of_the_trapezoid(share: float) -> None:
     """W = 8 c_t f^2 {V(P) - V(L) - (P - L) (D0(P) + D0(L)) / 2}, L = P - Q / f, V' = D0."""
     load, radii, nu = 4e-6, (1.0, 3.0), 0.2
-    hertz = ellipsoid(radii, load, nu)
-
-    def approach(P: float) -> float:
-        return ellipsoid(radii, P).approach
-
-    left = (1 - share) * load
-    area = quad(approach, left, load, epsabs=0, epsrel=1e-12)[0]
-    trapezoid = (load - left) * (approach(load) + approach(left)) / 2
-    loss = 8 * (2 - nu) / (2 * (1 - nu)) * 0.4**2 * (area - trapezoid)
+    hertz, left = ellipsoid(radii, load, nu), (1 - share) * load
+    area = quad(lambda P: ellipsoid(radii, P).approach, left, load, epsabs=0, epsrel=1e-12)[0]
+    trapezoid = (load - left) * (hertz.approach + ellipsoid(radii, left).approach) / 2
+    loss = 8 * (2 - nu) / (2 * (1 - nu)) * FRICTION**2 * (area - trapezoid)
     assert hertz.energy(share * hertz.largest_force) == pytest.approx(loss, rel=1e-6)
     stick = hertz.stick_radius(share * hertz.largest_force) / hertz.contact_radius
     assert stick == pytest.approx(np.cbrt(1 - share), rel=1e-14)
