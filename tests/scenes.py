@@ -48,9 +48,8 @@ def paper(geometry: Any = "summit") -> cr.Scene:
 
 def rough(geometry: Any = "summit") -> cr.Scene:
     """91 asperities with random heights and tip radii."""
-    scene = hexagonal(within=0.0126, height_std=1e-6, tip_radius_cv=0.1, seed=7)
-    assert len(scene) == 91
-    return replace(scene, geometry=geometry)
+    heights_and_tips: Any = dict(height_std=1e-6, tip_radius_cv=0.1, seed=7)
+    return replace(hexagonal(within=0.0126, **heights_and_tips), geometry=geometry)
 
 
 def steel(geometry: Any = "summit") -> cr.Scene:

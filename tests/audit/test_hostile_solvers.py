@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from friction_scenes import FRICTION, lengths, pressed
+from friction_scenes import FRICTION, PAPER, lengths, pressed
 from numpy.testing import assert_allclose
 from scenes import NAMED, PAPER_APPROACH, hexagonal, paper, reference
 from status_audit import ATTACKS, assert_honest, attack
@@ -143,7 +143,7 @@ def test_wrong_forces_are_never_called_right(field: str) -> None:
     contact = pressed("paper")
     force = 0.5 * FRICTION * contact.load
     truth = shear_vector(contact, force=force)
-    sliding = lengths(truth.slips) > 0
+    sliding, known = lengths(truth.slips) > 0, truth.certificate
 
     def spoil(values: Any, rng: np.random.Generator) -> Any:
         return values * (1 + 10.0 ** rng.uniform(-14, 1) * rng.standard_normal(values.shape))
@@ -151,7 +151,7 @@ def test_wrong_forces_are_never_called_right(field: str) -> None:
     for seed in range(12):
         liar = Liar(spoil, field, seed, FrictionNewton)
         state = shear_vector(contact, force=force, solver=liar)
-        proof, known = state.certificate, truth.certificate
+        proof = state.certificate
         off = lengths(state.forces - truth.forces)
         assert (off <= proof.force_errors + known.force_errors).all()
         assert (lengths(state.slips - truth.slips) <= proof.slip_errors + known.slip_errors).all()
@@ -178,9 +178,8 @@ def test_a_solver_cannot_change_what_the_proof_uses() -> None:
 
 def test_friction_after_small_loads_on_open_asperities() -> None:
     """Such loads, as interior-point methods leave them, gave open asperities a slip."""
-    scene, given = replace(paper(), friction=0.5), {"approach": PAPER_APPROACH}
-    residue = unrefined(lambda loads: loads + 1e-9 * loads.max())
-    contact, true = cr.press(scene, **given, solver=residue), cr.press(scene, **given)
+    given, residue = CONTROLS[0], unrefined(lambda loads: loads + 1e-9 * loads.max())
+    contact, true = cr.press(PAPER, **given, solver=residue), pressed("paper")
     assert (contact.loads > 0).all()
     state, known = (cr.shear(each, force=0.1 * true.load) for each in (contact, true))
     bounds = state.certificate.slip_errors + known.certificate.slip_errors
@@ -188,10 +187,10 @@ def test_friction_after_small_loads_on_open_asperities() -> None:
     assert not state.displacements[state.status == "open"].any()
     onsets, right = cr.onset_of_sliding(contact), cr.onset_of_sliding(true)
     assert_allclose(onsets, right, rtol=1e-12)  # nan where open
-    assert_allclose(cr.onset_of_sliding(cr.press(scene, **given, solver=BristleQP())), right)
+    assert_allclose(cr.onset_of_sliding(cr.press(PAPER, **given, solver=BristleQP())), right)
     for control in (given, {"load": 3e-7}):
-        nothing = cr.press(scene, **control, solver=unrefined(lambda loads: loads[::-1]))
-        onsets, right = (cr.onset_of_sliding(it) for it in (nothing, cr.press(scene, **control)))
+        nothing = cr.press(PAPER, **control, solver=unrefined(lambda loads: loads[::-1]))
+        onsets, right = (cr.onset_of_sliding(it) for it in (nothing, cr.press(PAPER, **control)))
         known = np.isfinite(onsets)  # where nothing is proved about the first touch they are nan
         assert not known[:7].any()
         assert_allclose(onsets[known], right[known], rtol=1e-12)
@@ -199,12 +198,11 @@ def test_friction_after_small_loads_on_open_asperities() -> None:
 
 def test_limits_and_derivatives_are_those_of_the_solution() -> None:
     """No derivatives, where nothing is proved to touch."""
-    scene = replace(paper(), friction=0.5)
-    contact = cr.press(scene, load=3e-7, solver=unrefined(lambda loads: 2 * loads))
+    contact = cr.press(PAPER, load=3e-7, solver=unrefined(lambda loads: 2 * loads))
     for call in (cr.shear, cr.cycle):
         what = {"force" if call is cr.shear else "maximum": 0.4 * contact.load}
         with pytest.raises(cr.InputError, match=r"1\.6 f P: gross sliding\), expected at most f P"):
             call(contact, **what)
-    turned = cr.press(scene, approach=PAPER_APPROACH, solver=unrefined(lambda loads: loads[::-1]))
+    turned = cr.press(PAPER, approach=PAPER_APPROACH, solver=unrefined(lambda loads: loads[::-1]))
     with pytest.raises(cr.SolverError, match="no asperity is proved to touch"):
         turned.gradient(load=1.0)
