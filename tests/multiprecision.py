@@ -307,7 +307,7 @@ def coupling(points: Balls, modulus: arb) -> Balls:
 def _positive_part(delta: Balls) -> Balls:
     """max(delta, 0), where every sign is known."""
     if any(ball.contains(0) and ball != 0 for ball in delta):
-        raise NotProved("an asperity grazes: its indentation may have either sign")
+        raise NotProved("an asperity touches or slides, or fails to, by less than its ball")
     return np.where(delta > 0, delta, ZERO)
 
 
@@ -343,29 +343,18 @@ class VectorMap:
     total: Balls  # (2,) T
     unit: Any  # a length over a force, so that every row of F is a length
 
-    def force(self, i: int, eta: Balls) -> tuple[Balls, Balls]:
-        """q_i (2,) and its derivative (2, 2)."""
-        length = (eta @ eta).sqrt()
-        if not length > 0:
-            raise NotProved("a displacement may be zero")
-        share = length / self.thresholds[i]
-        if share > 1:
-            size, slope = self.loads[i], ZERO
-        elif share < 1:
-            root = (1 - share).sqrt()
-            size = self.loads[i] * (1 - root**3)
-            slope = arb(3) / 2 * self.loads[i] / self.thresholds[i] * root
-        else:
-            raise NotProved("an asperity slides or sticks, by less than its ball")
-        along = np.outer(eta, eta) / (length * length)
-        across = exact(np.eye(2)) - along
-        return size / length * eta, slope * along + size / length * across
-
     def forces(self, x: Balls) -> tuple[Balls, Balls]:
         """q (n, 2) and their derivatives (n, 2, 2)."""
-        pairs = [self.force(i, eta) for i, eta in enumerate(x[:-2].reshape(-1, 2))]
-        q, slopes = (np.array(each) for each in zip(*pairs, strict=True))
-        return q, slopes
+        eta = x[:-2].reshape(-1, 2)
+        length = np.sqrt((eta * eta).sum(axis=1))
+        if not (length > 0).all():
+            raise NotProved("a displacement may be zero")
+        root = np.sqrt(_positive_part(1 - length / self.thresholds))  # 0 where it slides
+        slope = 3 * self.loads / (2 * self.thresholds) * root
+        secant = (self.loads * (1 - root**3) / length)[:, None, None]
+        along = eta[:, :, None] * eta[:, None, :] / (length * length)[:, None, None]
+        slopes = slope[:, None, None] * along + secant * (exact(np.eye(2)) - along)
+        return secant[:, 0] * eta, slopes
 
     def residual(self, x: Balls) -> Balls:
         q, n = self.forces(x)[0], len(self.loads)
