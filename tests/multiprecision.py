@@ -383,11 +383,9 @@ def solve_vectors(
         x = newton(problem, x, tolerance=arb(size) * arb(10) ** (-digits - GUARD_DIGITS // 2))
         x = prove(problem, x, radius=arb(size) * arb(10) ** (-digits))
         eta = x[:-2].reshape(-1, 2)
-        lengths = np.sqrt((eta * eta).sum(axis=1))
-        sliding = lengths > problem.thresholds
-        beyond = 1 - problem.thresholds / lengths
-        slips = np.where(sliding[:, None], beyond[:, None] * eta, ZERO)
-        return VectorReference(problem.forces(x)[0], slips, x[-2:], sliding.tolist())
+        beyond = _positive_part(1 - problem.thresholds / np.sqrt((eta * eta).sum(axis=1)))
+        slips, sliding = beyond[:, None] * eta, (beyond > 0).tolist()
+        return VectorReference(problem.forces(x)[0], slips, x[-2:], sliding)
 
 
 def _problem(
