@@ -214,13 +214,6 @@ def test_numbers_that_the_first_scene_lacks() -> None:
         swept(held | {"gradient": {"of": "loss", "fraction": 0.5}})
 
 
-def test_a_figure_says_what_a_band_pools() -> None:
-    over = {"sphere.radius": [0.9, 1.0], "normal.load": [1e-7, 2e-7, 3e-7]}
-    table = swept(sweeping(over=over | {"friction.coefficient": [0.4, 0.5]}))
-    legend = table.plot("contact", "sphere.radius").get_legend()
-    assert "all load, coefficient: 6 combinations" in legend.get_texts()[0].get_text()
-
-
 def test_what_is_refused(whole: cr.SweepTable) -> None:
     for call, said in (
         (lambda: whole.quantiles(at=[1.5]), r"at\[0\]: found 1.5, expected a number from 0"),
@@ -261,9 +254,13 @@ def test_what_is_not_proved_is_said_counted_and_marked(command: Any, tmp_path: P
         )
 
 
-def test_numbers_of_several_decades_have_a_logarithmic_axis() -> None:
-    table = swept(sweeping(over={"normal.load": [1e-10, 3e-7]}, measure=["load", "contact"]))
-    assert [table.plot(name).get_yscale() for name in ("load", "contact")] == ["log", "linear"]
+def test_a_figure_has_a_logarithmic_axis_for_decades_and_says_what_a_band_pools() -> None:
+    over = {"sphere.radius": [0.9, 1.0], "normal.load": [1e-10, 2e-7, 3e-7]}
+    over |= {"friction.coefficient": [0.4, 0.5]}
+    table = swept(sweeping(over=over, measure=["load", "contact"]))
+    load, contact = (table.plot(name, "sphere.radius") for name in ("load", "contact"))
+    assert (load.get_yscale(), contact.get_yscale()) == ("log", "linear")
+    assert "all load, coefficient: 6 combinations" in contact.get_legend().get_texts()[0].get_text()
 
 
 def test_a_figure_of_names_joins_nothing() -> None:
@@ -328,20 +325,16 @@ def test_a_folder_of_another_sweep_is_refused(folder: Path) -> None:
     assert kept.exists()
 
 
-def test_parts_without_a_manifest_stay(folder: Path) -> None:
-    """A sweep that is not told to overwrite removes nothing."""
-    (folder / "manifest.json").unlink()
-    before = {path.name for path in (folder / "parts").iterdir()}
-    table = swept(tables(sweep={"seeds": 1}), out=folder)
-    assert table.complete
-    assert before < {path.name for path in (folder / "parts").iterdir()}
-
-
-def test_nothing_of_a_folder_that_is_no_sweep_is_removed(tmp_path: Path) -> None:
-    (tmp_path / "manifest.json").write_text("{}")
+def test_nothing_of_a_folder_that_is_no_sweep_is_removed(folder: Path) -> None:
+    """Nor parts without a manifest, by a sweep that is not told to overwrite."""
+    manifest, before = folder / "manifest.json", {*(folder / "parts").iterdir()}
+    manifest.write_text("{}")
     with pytest.raises(cr.FileError, match="cannot be read: not a sweep"):
-        swept(SMALL, out=tmp_path, overwrite=True)
-    assert (tmp_path / "manifest.json").read_text() == "{}"
+        swept(SMALL, out=folder, overwrite=True)
+    assert manifest.read_text() == "{}"
+    manifest.unlink()
+    assert swept(tables(sweep={"seeds": 1}), out=folder).complete
+    assert before < {*(folder / "parts").iterdir()}
 
 
 def test_resuming_computes_what_is_missing_or_damaged_only(
@@ -487,8 +480,7 @@ ROUGH = {**SMALL["asperities"], "height_std": 1e-7}  # seeds are those of the sw
 WRONG = [
     ({k: v for k, v in SMALL.items() if k != "sweep"}, "[sweep]: missing table"),
     (tables(sweep={"sede": 3}), '[sweep] sede: unknown key, did you mean "seeds"?'),
-    (sweeping(over={"normal.load": [1e-7, -1.0]}),
-     "[sweep] over.normal.load[1]: [normal] load: found -1.0, expected a positive number"),
+    (sweeping(over={"normal.load": [1e-7, -1.0]}), "[sweep] over.normal.load[1]: [normal] load:"),
     (sweeping(over={"sweep.seeds": [1, 2]}), "over.sweep.seeds: expected a key of a"),
     (sweeping(over={"normal.load": [1e-7, 1e-7]}), "values, none of them twice"),
     (sweeping(over={"material.sphere.poisson_ratio": [0.2]}, together={"material.sphere": [1]}),
