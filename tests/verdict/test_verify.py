@@ -42,11 +42,9 @@ def test_what_is_right(command: Any, contact: cr.Contact, scene: str) -> None:
     outcome = command("verify", scene, claim(contact), "--within", "1e-10")
     assert (outcome.status, outcome.err) == (0, "")
     said = [line for line in outcome.out.splitlines() if line]
-    heads = "geometry contact modulus result wrong statuses undecided load error total load"
-    assert " ".join(line[:18].strip() for line in said[1:8]) == heads
     assert re.search(r" proved; loads correct to within \S+e-1\d of the largest load$", said[3])
-    assert [line[18:] for line in said[4:6]] == ["none"] * 2
-    assert re.match(r"at most \S+e-1\d of the largest load \(1e-10 allowed\)", said[6][18:])
+    assert said[4:6] == ["wrong statuses    none", "undecided         none"]
+    assert re.search(r"error +at most \S+e-1\d of the largest load \(1e-10 allowed\)", said[6])
     assert said[7].endswith("(as prescribed)" if scene == "b.toml" else "(none prescribed)")
 
 
@@ -60,15 +58,14 @@ def test_a_bound_is_not_rounded_up_above_the_limit(command: Any, contact: cr.Con
 def test_errors_relative_to_zero(command: Any, contact: cr.Contact) -> None:
     Path("c.toml").write_text(scene_text(WITHIN, "approach = -5e-5", MORE))
     largest = float(contact.loads.max())
-    floor, of_solution = ("--floor", "1"), "load of the solution"
-    for scene, factor, options, which, result in (
-        ("a.toml", 0.0, (), "given load", "contact set wrong"),
-        ("c.toml", 1.0, (), of_solution, "contact set wrong"),
-        ("c.toml", 1.0, floor, of_solution, r"contact set proved; errors of up to \S+ N while the"),
+    for scene, factor, floor, which, result in (
+        ("a.toml", 0.0, "0", "given load", "wrong"),
+        ("c.toml", 1.0, "0", "load of the solution", "wrong"),
+        ("c.toml", 1.0, "1", "load of the solution", r"proved; errors of up to \S+ N while the"),
     ):
-        asked = ("verify", scene, claim(contact, factor=factor), *options)
+        asked = ("verify", scene, claim(contact, factor=factor), "--floor", floor)
         outcome = command(*asked)
-        assert re.search(f"^result            {result}", outcome.out, re.M)
+        assert re.search(f"^result            contact set {result}", outcome.out, re.M)
         said = rf"(\S+) N while the largest {which} is 0 \(1 % allowed; exceeded by 37 loads"
         (shown,) = re.findall(f"^load error        at most {said}", outcome.out, re.M)
         verdict = json.loads(command(*asked, "--json").out)["verdict"]
@@ -169,13 +166,13 @@ def test_statuses_that_contradict_the_loads_are_refused(command: Any, contact: c
     texts = np.array(contact.status)
     flags = np.where(texts == "open", "0", "1")
     for said, column, asperity, word in (
-        *((texts, "status", asperity, word) for asperity, word in ((0, "open"), (60, "contact"))),
+        (texts, "status", 0, "open"),
+        (texts, "status", 60, "contact"),
         (flags, "Contact", 0, "0"),
         (flags, "touching", 60, "1"),
         (np.where(flags == "1", "True", "False"), "in_contact", 0, "False"),
         (np.where(flags == "1", "0", "1"), "open", 0, "1"),
         (np.where(texts == "open", "open", "closed"), "contact", 0, "open"),
-        (np.where(flags == "1", "TRUE", "FALSE"), "contact", 60, "TRUE"),
     ):
         wrong = said.copy()
         wrong[asperity] = word
@@ -184,8 +181,7 @@ def test_statuses_that_contradict_the_loads_are_refused(command: Any, contact: c
             outcome = command("verify", "a.toml", "loads.csv")
             assert outcome.status == status
             place = f"row {2 + asperity}, column {column.lower()}"
-            told = f'{place}: found "{word.lower()}", expected "'
-            assert (told in outcome.err) == (status == 2), outcome.err
+            assert (f'{place}: found "{word.lower()}", expected "' in outcome.err) == bool(status)
 
 
 def test_shear_forces(command: Any, contact: cr.Contact) -> None:
@@ -219,15 +215,13 @@ def test_shear_forces(command: Any, contact: cr.Contact) -> None:
         assert outcome.status == 3
         assert "hint: the shear forces " in outcome.err
         assert said in outcome.err
-    spoiled = state.forces.copy()
-    spoiled[4] = 0.5 * contact.loads[4]
+    spoiled = np.where(np.arange(61) == 4, 0.5 * contact.loads, state.forces)
     outcome = judged(spoiled, "--json")
     assert outcome.status == 3
     found = json.loads(outcome.out)
+    sheared, row = found["shear_verdict"], found["asperities"][4]
     assert found["verdict"]["holds"]
-    assert found["shear_verdict"]["wrongly_sliding"] == [4]
-    assert found["shear_verdict"]["suspects"] == [4]
-    row = found["asperities"][4]
+    assert (sheared["wrongly_sliding"], sheared["suspects"]) == ([4], [4])
     assert (row["shear_claimed"], row["shear_status"]) == ("sliding", "partial")
     assert row["force_error"] >= spoiled[4] - state.forces[4]
     assert "the total force is not the prescribed one" in outcome.err
@@ -235,28 +229,22 @@ def test_shear_forces(command: Any, contact: cr.Contact) -> None:
     other = cr.shear(contact, force=1.1 * state.force)
     right = np.abs(other.forces - state.forces) <= 1e-12 * state.forces.max()
     assert right[contact.loads > 0].any()
-    found = json.loads(judged(other.forces, "--json").out)
-    assert found["shear_verdict"]["suspects"]
-    assert not right[found["shear_verdict"]["suspects"]].any()
+    suspects = json.loads(judged(other.forces, "--json").out)["shear_verdict"]["suspects"]
+    assert suspects
+    assert not right[suspects].any()
 
 
 def test_wrong_use(command: Any, contact: cr.Contact) -> None:
     loads = claim(contact)
     for wrong, expected in (
         (("--shear", loads), "--shear and --shear-force go together"),
-        (("--shear-force", "1"), "--shear and --shear-force go together"),
-        (("--within", "0"), "--within: found 0.0, expected a positive number"),
         (("--within", "5"), "; 5 % is 0.05"),
         (("--tolerance", "-1"), "--tolerance: found -1.0"),
         (("--tolerance", "1"), "--tolerance: found 1.0, expected at most 0.00125, half the small"),
         (("--sign", "-1"), "no load is positive, expected positive compression: without --sign -1"),
-        (("--floor", "-1"), "--floor: found -1.0"),
         (("--floor", "nan"), "--floor: found nan"),
         (("--column", "x=x", "coord"), "hint: quote names that contain spaces"),
-        (
-            ("--shear", loads, "--shear-force", "1", "--column", "force=load"),
-            "--shear-force: force: found 1.0 (",
-        ),
+        (("--shear", loads, "--shear-force", "1", "--column", "force=load"), "force: found 1.0 ("),
     ):
         assert command("verify", "a.toml", loads, *wrong).refuses(expected)
 
@@ -266,8 +254,8 @@ def test_the_figure(contact: cr.Contact) -> None:
     loads[36], loads[50] = 0.0, loads.max()
     verdict = cr.verify(contact.scene, loads, approach=5e-5)
     force = 0.25 * contact.load
-    forces = cr.shear(contact, force=force).forces.copy()
-    forces[4] = 0.5 * contact.loads[4]
+    forces = cr.shear(contact, force=force).forces
+    forces = np.where(np.arange(61) == 4, 0.5 * contact.loads, forces)
     sheared = verify_shear(contact, forces, force=force)
     for figures in (verdict_figures(verdict), verdict_figures(verdict, sheared)):
         said = {text.get_text() for text in texts(figures["verdict"])}
