@@ -103,8 +103,8 @@ def test_a_run_says_what_the_package_says(run: Any, command: Any) -> None:
     assert summary == json.loads((folder / "summary.json").read_text())
     assert (summary["schema"], summary["version"]) == (2, cr.__version__)
     normal, proof = summary["normal"], summary["normal"]["certificate"]
-    counts = {"asperities": 61, "candidates": 61, "contact": 37, "open": 24, "undecided": 0}
-    assert {key: normal[key] for key in counts} == counts
+    counts = [normal[key] for key in ("asperities", "candidates", "contact", "open", "undecided")]
+    assert counts == [61, 61, 37, 24, 0]
     assert normal["load"] == pytest.approx(3.60853389e-7, rel=1e-8)
     assert (normal["approach"], normal["solver"]) == (5e-5, "newton")
     verified = command("verify", "a.toml", "deep/er/asperities.csv", "--json")
@@ -112,13 +112,11 @@ def test_a_run_says_what_the_package_says(run: Any, command: Any) -> None:
 
     file = read_scene("a.toml")
     contact = file.press()
-    assert contact.certificate.convexity_number == pytest.approx(0.504, abs=5e-4)
-    assert contact.model_error == pytest.approx(0.002, abs=5e-4)
     for name in ("scope", "convexity_number", "load_error", "gap_error"):
         assert proof[name] == getattr(contact.certificate, name)
     limit = 0.5 * contact.load
-    counts = [[row[key] for row in summary["shear"]] for key in ("sliding", "partial", "undecided")]
-    assert counts == [[0, 6, 6], [37, 31, 31], [0, 0, 0]]
+    counts = [[row[key] for key in ("sliding", "partial", "undecided")] for row in summary["shear"]]
+    assert counts == [[0, 37, 0], [6, 31, 0], [6, 31, 0]]
     half = cr.shear(contact, force=0.5 * limit)
     last = [row for row in rows(folder / "shear.csv") if float(row["fraction"]) == 0.5]
     assert [float(row["force"]) for row in last] == list(half.forces)

@@ -107,12 +107,11 @@ def test_lists(tmp_path: Path, header: str) -> None:
 
 def test_rounded_coordinates_and_spaced_rows(tmp_path: Path) -> None:
     heights = np.random.default_rng(4).normal(size=(40, 40)) * 1e-3
-    rows = [f"{0.65e-3 * i:.4f} {0.65e-3 * j:.4f} {heights[j, i]!r}" for j, i in np.ndindex(40, 40)]
-    surface = raw(tmp_path / "a.xyz", "\n".join(rows).replace("np.float64(", "").replace(")", ""))
+    rows = [f"{6.5e-4 * i:.4f} {6.5e-4 * j:.4f} {heights[j, i]!s}" for j, i in np.ndindex(40, 40)]
+    surface = raw(tmp_path / "a.xyz", "\n".join(rows))
     assert_array_equal(surface.heights, heights)
     assert_allclose(surface.pixel, 0.65e-3, rtol=5e-3)
-    blocks = "".join(f"{row}\n" + "\n" * ((i + 1) % 40 == 0) for i, row in enumerate(rows))
-    blocks = blocks.replace("np.float64(", "").replace(")", "")  # as for gnuplot's splot
+    blocks = "\n\n".join("\n".join(rows[i : i + 40]) for i in range(0, 1600, 40))  # as for splot
     assert_array_equal(raw(tmp_path / "b.xyz", blocks).heights, heights)
     spaced = raw(tmp_path / "a.txt", "\n\n" + matrix(ending="\n\n") + "\n\n", pixel=1.0)
     assert_array_equal(spaced.heights, HEIGHTS)
