@@ -42,11 +42,10 @@ class Shuffled(Executor):
         self._given: list[tuple[Future[Any], Any, Any]] = []
 
     def submit(self, function: Any, /, *arguments: Any, **keys: Any) -> Future[Any]:
-        future: Future[Any] = Future()
-        self._given.append((future, function, arguments))
+        self._given.append((Future(), function, arguments))
         if len(self._given) == -(-PLAN.source.count // PLAN.manifest["batch"]):
-            for future, function, arguments in reversed(self._given):
-                future.set_result(function(*arguments))
+            for future, work, given in reversed(self._given):
+                future.set_result(work(*given))
         return self._given[-1][0]
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scene_files import SMALL, numbers, same, scene_text, sweeping, swept, tables, toml
+from scene_files import SMALL, numbers, same, sweeping, swept, tables, toml
 from scenes import hexagonal, paper
 
 import convexrough as cr
@@ -124,19 +124,17 @@ def test_scenes_made_in_python() -> None:
     assert table.columns[:5] == ["scene", "normal.load", "seed", "status", "message"]
     assert table.columns[5:] == ["approach", "loss_0.3", "load"]
     assert numbers(table, "normal.load", "seed") == [loads, [-1, -1, -1]]
-    for i, scene in enumerate(scenes):
-        contact = cr.press(scene, load=loads[i])
-        row = {name: values[i] for name, values in table.read(["approach", "loss_0.3"]).items()}
-        loss = cr.cycle(contact, maximum=0.3 * 0.5 * contact.load).loss
-        assert row == {"approach": contact.approach, "loss_0.3": loss}
+    contacts = [cr.press(scene, load=load) for scene, load in zip(scenes, loads, strict=True)]
+    losses = [cr.cycle(each, maximum=0.3 * 0.5 * each.load).loss for each in contacts]
+    approaches = [each.approach for each in contacts]
+    assert numbers(table, "approach", "loss_0.3") == [approaches, losses]
 
 
 def test_scenes_of_a_made_lattice_are_the_same_in_other_processes() -> None:
     """The layout of the points goes with them, so that rounding is the same."""
     scene = hexagonal(0.0012, 0.01, height_std=1e-6, seed=1)
-    contact, again = (
-        cr.press(each, load=1e-7) for each in (scene, pickle.loads(pickle.dumps(scene)))
-    )
+    contact = cr.press(scene, load=1e-7)
+    again = cr.press(pickle.loads(pickle.dumps(scene)), load=1e-7)
     assert len(scene) > 200
     assert contact.influence == again.influence
     assert again.scene.lattice.basis.tolist() == scene.lattice.basis.tolist()
@@ -206,9 +204,7 @@ def test_numbers_that_the_first_scene_lacks() -> None:
     phases = sweeping(measure=["phase_losses.loss"], over={"steady.phases": [[0.5], [0.0, 1.0]]})
     status, message = numbers(swept(phases | {"steady": {"ellipse": ELLIPSE}}), "status", "message")
     assert status == ["certified", "failed"]
-    assert message[1].startswith(
-        "steady.phase_losses.loss: found row 1, without a column, expected"
-    )
+    assert message[1].startswith("steady.phase_losses.loss: found row 1, without a column")
     held = sweeping(measure=["by.load", "by.approach"], over=HELD)
     with pytest.raises(cr.InputError, match=r"measure: found .by\.load., expected a number"):
         swept(held | {"gradient": {"of": "loss", "fraction": 0.5}})
@@ -240,18 +236,15 @@ def test_what_is_not_proved_is_said_counted_and_marked(command: Any, tmp_path: P
     assert numbers(table, "status", "message") == [["undecided", "certified"], [said, ""]]
     assert table.quantiles()["undecided"].tolist() == [1, 0]
     axes = table.plot()
-    (open_at,) = [
-        line for line in axes.lines if line.get_mfc() == "white" and len(line.get_xdata())
-    ]
-    assert open_at.get_xydata().tolist() == [[0.0, 0.0]]
+    white = [line.get_xydata().tolist() for line in axes.lines if line.get_mfc() == "white"]
+    assert [points for points in white if points] == [[[0.0, 0.0]]]
     assert axes.get_legend().get_texts()[-1].get_text() == "with undecided scenes"
     (tmp_path / "a.toml").write_text(toml(graze))
     for asked in (("a.toml", "--workers", "1"), ("--summary", "a-sweep")):
         status, _, err = command("sweep", *asked)
         assert status == 3
-        assert err.startswith(
-            f"convexrough: warning: undecided scenes: 1 of 2; the first is scene 0: {said}"
-        )
+        first = f"undecided scenes: 1 of 2; the first is scene 0: {said}"
+        assert err.startswith(f"convexrough: warning: {first}")
 
 
 def test_a_figure_has_a_logarithmic_axis_for_decades_and_says_what_a_band_pools() -> None:
@@ -306,23 +299,18 @@ def test_a_part_of_a_sweep(whole: cr.SweepTable, tmp_path: Path) -> None:
 
 def test_a_folder_of_another_sweep_is_refused(folder: Path) -> None:
     before = sorted(path.name for path in (folder / "parts").iterdir())
-    with pytest.raises(cr.FileError) as caught:
+    another = "holds another sweep, 16 scenes of sweep by version.*this is 20 scenes of sweep"
+    with pytest.raises(cr.FileError, match=another):
         swept(tables(sweep={"seeds": 5}), out=folder, resume=True)
-    said = str(caught.value)
-    assert "holds another sweep, 16 scenes of sweep by version" in said
-    assert "this is 20 scenes of sweep" in said
     with pytest.raises(cr.FileError, match="holds 16 of these 16 scenes already; resume=True"):
         swept(SMALL, out=folder)
     assert sorted(path.name for path in (folder / "parts").iterdir()) == before
-    other = tables(sweep={"seeds": 1})
-    (folder / "notes.txt").write_text("mine")
-    (folder / "parts/7.parquet.bak").write_text("mine")
-    (part,) = list((folder / "parts").glob("0*0-*"))[:1]
-    kept = part.rename(part.with_name(f"{part.name}.bak"))
-    replaced = swept(other, out=folder, overwrite=True)
-    assert same(replaced, swept(other))
-    assert (folder / "notes.txt").read_text() == (folder / "parts/7.parquet.bak").read_text()
-    assert kept.exists()
+    other, part = tables(sweep={"seeds": 1}), next((folder / "parts").iterdir())
+    notes, kept = folder / "notes.txt", part.with_name(f"{part.name}.bak")
+    for mine in (notes, kept):
+        mine.write_text("mine")
+    assert same(swept(other, out=folder, overwrite=True), swept(other))
+    assert notes.read_text() == kept.read_text() == "mine"
 
 
 def test_nothing_of_a_folder_that_is_no_sweep_is_removed(folder: Path) -> None:
@@ -361,25 +349,23 @@ def test_resuming_computes_what_is_missing_or_damaged_only(
 
 
 @pytest.mark.usefixtures("no_processes")
-def test_the_command(command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_command(command: Any, tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(toml(SMALL))
-    (tmp_path / "s.toml").write_text(scene_text())
     status, out, err = command("sweep", "a.toml", "--workers", "1")
     assert (status, err) == (0, "")
     assert "scenes      16\nrows        16\n  certified 16\n" in out
-    status, out, err = command("sweep", "a.toml", "--workers", "1", "--resume", "--json")
-    assert '"computed": 0' in out
+    resumed = command("sweep", "a.toml", "--workers", "1", "--resume", "--json")
+    assert '"computed": 0' in resumed.out
     status, out, err = command("sweep", "--summary", "a-sweep", "--out", "b")
-    assert status == 0
-    assert len([line for line in out.splitlines() if "loss_0.37" in line]) == 4 + 1
+    assert (status, sum("loss_0.37" in line for line in out.splitlines())) == (0, 4 + 1)
     written = {path.name for path in (tmp_path / "b").iterdir()}
     assert {"quantiles.csv", "loss_0.37-over-normal.load.png"} <= written
     parts = sorted((tmp_path / "a-sweep/parts").iterdir())
     parts[0].unlink()
     parts[3].unlink()
-    status, out, err = command("sweep", "--summary", "a-sweep", "--out", "c")
+    incomplete = command("sweep", "--summary", "a-sweep", "--out", "c")
     assert len(list((tmp_path / "c").glob("*.png"))) == len(written) - 2
-    assert err == "convexrough: warning: incomplete: 2 of 16 scenes are missing\n"
+    assert incomplete.err == "convexrough: warning: incomplete: 2 of 16 scenes are missing\n"
     assert json.loads((tmp_path / "c/files.json").read_text())["rows"] == 14
     assert cr.open_sweep("a-sweep").plot().get_title("left") == "2 scenes are missing"
 
@@ -405,25 +391,24 @@ def mistakes(contents: dict[str, Any]) -> str:
     return str(caught.value)
 
 
-def grid(**keys: Any) -> Grid:
-    return Grid(measure=["load"], **keys)
+def points(**keys: Any) -> list[tuple[Any, ...]]:
+    """The values and the seed of each scene."""
+    grid = Grid(measure=["load"], **keys)
+    return [(*values.values(), seed) for values, seed in map(grid.point, range(grid.count))]
 
 
 def test_rows_are_in_the_order_of_lists_then_grid_then_seeds() -> None:
     together = {"sphere.radius": [1.0, 2.0], "material.poisson_ratio": [0.1, 0.2]}
     over = {"normal.load": [1, 2, 3], "asperities.height_std": [0.0, 1.0]}
-    mine = grid(together=together, over=over, seeds=[7, 5])
-    assert mine.count == 2 * 3 * 2 * 2
-    found = [mine.point(i) for i in range(mine.count)]
     expected = itertools.product([(1.0, 0.1), (2.0, 0.2)], (1, 2, 3), (0.0, 1.0), (7, 5))
-    for (values, seed), (both, load, height, own) in zip(found, expected, strict=True):
-        assert (*values.values(), seed) == (*both, load, height, own)
+    found = points(together=together, over=over, seeds=[7, 5])
+    assert found == [(*both, *others) for both, *others in expected]
 
 
 def test_draws_belong_to_the_seed_alone() -> None:
     def samples(**draw: Any) -> list[float]:
-        mine = grid(over={"normal.load": [1, 2]}, draw=draw, seeds=5)
-        return [mine.point(i)[0]["friction.coefficient"] for i in range(mine.count)]
+        found = points(over={"normal.load": [1, 2]}, draw=draw, seeds=5)
+        return [friction for *_, friction, _ in found]
 
     friction = {"friction.coefficient": {"uniform": [0.2, 0.6]}}
     alone = samples(**friction)

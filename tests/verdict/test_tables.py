@@ -29,9 +29,11 @@ def read_loads(path: Path, scene: cr.Scene = SMALL, **how: Any) -> Claimed:
     return read_with(path, scene, Manner(**how))
 
 
-def read(folder: Path, made: Any, name: str = "loads.csv", scene: cr.Scene = SMALL) -> Claimed:
+def read(
+    folder: Path, made: Any, name: str = "loads.csv", scene: cr.Scene = SMALL, **how: Any
+) -> Claimed:
     """The loads of a file that holds this."""
-    return read_loads(folder / put(folder, made, name), scene)
+    return read_loads(folder / put(folder, made, name), scene, **how)
 
 
 def refused(folder: Path, content: str | bytes) -> list[str]:
@@ -104,27 +106,24 @@ def test_a_line_of_numbers(tmp_path: Path) -> None:
     assert read(tmp_path, "1.5,0,2.5e-5\n").values.tolist() == LOADS
     few = replace(SMALL, asperities=cr.Asperities(PLACES[:2], 0.1))
     assert read(tmp_path, "0.25,0.5\n", scene=few).values.tolist() == [0.25, 0.5]
-    alone = read_loads(tmp_path / put(tmp_path, "1,0,3\n"), missing_open=True)
-    assert alone.values.tolist() == [0.0, 3.0, 0.0]
+    assert read(tmp_path, "1,0,3\n", missing_open=True).values.tolist() == [0.0, 3.0, 0.0]
 
 
 def test_columns_without_names_that_are_ignored_are_named(tmp_path: Path) -> None:
-    path = tmp_path / put(tmp_path, "0,9,9,1.5\n0,9,9,0\n0,9,9,2.5e-5\n")
-    found = read_loads(path, columns={"load": "4"})
-    assert found.values.tolist() == LOADS
-    assert "in the scene's order (not used: column 1, column 2, column 3)" in found.note
-    put(tmp_path, "0,inf,nan,1.5\n0,9,9,0\n0,9,9,2.5e-5\n")  # numbers that are no positions
-    assert read_loads(path, columns={"load": "4"}).values.tolist() == LOADS
+    for other in ("0,9,9", "0,inf,nan"):  # also numbers that are no positions
+        made = f"{other},1.5\n0,9,9,0\n0,9,9,2.5e-5\n"
+        found = read(tmp_path, made, columns={"load": "4"})
+        assert found.values.tolist() == LOADS
+        assert "in the scene's order (not used: column 1, column 2, column 3)" in found.note
 
 
 def test_arrays(tmp_path: Path) -> None:
     table = np.column_stack((PLACES, LOADS))
-    records = np.rec.fromarrays(table.T, names="x,y,load")
     columns = {"x": table[:, 0], "y": table[:, 1], "load": LOADS, "more": ["a", "b", "c"]}
     alone = {"force": 3.0, "grid": np.eye(4), "load": LOADS, "other": np.ones(9)}
-    for made in (LOADS, table, records):
+    for made in (LOADS, table, np.rec.fromarrays(table.T, names="x,y,load")):
         assert read(tmp_path, made, "a.npy").values.tolist() == LOADS
-    for made in ({"load": LOADS}, {"arr_0": LOADS}, columns, alone):
+    for made in ({"arr_0": LOADS}, columns, alone):
         assert read(tmp_path, made, "a.npz").values.tolist() == LOADS
 
 
@@ -176,29 +175,23 @@ def test_parquet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_shear_forces_with_statuses(tmp_path: Path) -> None:
     content = "status,force [N],x,y\nopen,0,1,0\nsliding,-2,0,0\npartial,1,0.5,2.5\n"
-    path = tmp_path / put(tmp_path, content)
-    found = read_shear_forces(path, SMALL, Manner())
+    found = read_shear_forces(tmp_path / put(tmp_path, content), SMALL, Manner())
     assert found.values.tolist() == [-2, 0, 1]
     assert found.status is not None
     assert found.status.tolist() == ["sliding", "open", "partial"]
-    put(tmp_path, "force\n1\n2\n3\n")
-    assert read_shear_forces(path, SMALL, Manner()).status is None
 
 
 def test_loads_at_a_slightly_different_place(tmp_path: Path) -> None:
     scene = rough()
     loads = cr.press(scene, approach=2e-5).loads
     x, y = scene.asperities.positions.T
-    near, far = (
-        tmp_path / put(tmp_path, {"x": x + part * 0.0025, "y": y, "load": loads}, f"{part}.csv")
-        for part in (0.009, 0.011)
-    )
-    assert np.array_equal(read_loads(near, scene).values, loads)
-    with pytest.raises(cr.InputError, match="to within 1e-05"):
-        read_loads(near, scene, tolerance=1e-5)
-    with pytest.raises(cr.InputError, match=r"by \[2.75e-05, 0\], to within 2.5e-05, exp"):
-        read_loads(far, scene)
-    assert np.array_equal(read_loads(far, scene, tolerance=1e-4).values, loads)
+    for shift, tolerances in ((0.009 * 0.0025, (None, 1e-5)), (0.011 * 0.0025, (1e-4, None))):
+        path = tmp_path / put(tmp_path, {"x": x + shift, "y": y, "load": loads})
+        accepted, refused = tolerances
+        assert np.array_equal(read_loads(path, scene, tolerance=accepted).values, loads)
+        said = rf"by \[{shift:.6g}, 0\], to within {refused or 2.5e-5:.6g}, exp"
+        with pytest.raises(cr.InputError, match=said):
+            read_loads(path, scene, tolerance=refused)
 
 
 @pytest.mark.sample(8)
