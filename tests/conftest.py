@@ -68,11 +68,9 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             cases[item.nodeid.partition("[")[0]].append(item)
     left_out: set[pytest.Item] = set()
     for test, found in cases.items():
-        marker = found[0].get_closest_marker("sample")
-        assert marker is not None
-        many = min(marker.args[0], len(found))
-        sample = random.Random(f"{config.option.seed} {test}").sample(found, many)
-        left_out |= set(found) - set(sample)
+        many = next(found[0].iter_markers("sample")).args[0]
+        random.Random(f"{config.option.seed} {test}").shuffle(found)
+        left_out |= {*found[many:]}
     config.hook.pytest_deselected(items=[item for item in items if item in left_out])
     items[:] = [item for item in items if item not in left_out]
 

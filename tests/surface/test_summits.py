@@ -71,11 +71,10 @@ def test_a_scan_becomes_a_scene(command: Any) -> None:
     counted = f"summits           {len(summits):,}  (of {summits.origin.maxima:,} maxima"
     assert counted in outcome.out
     assert "removed           plane, slopes 0.01" in outcome.out
-    (line,) = re.findall("density .*", outcome.out)
     found = cr.surface.read("scan.npz")
     density = found.summits(0.0).statistics.density
-    assert line.split()[:3] == ["density", "[1/µm²]", f"{density:.4g}"]
-    assert line.split()[4] == f"{found.moments.density:.4g}"
+    said = rf"density +\[1/µm²\] +{density:.4g} +\S+ +{found.moments.density:.4g}"
+    assert re.search(said, outcome.out)
 
 
 @pytest.mark.usefixtures("surface")
@@ -158,9 +157,7 @@ def test_summits_on_filled_pixels_are_counted(find: Any, surface: cr.surface.Sur
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("missing.npy",), "missing.npy: cannot be read: No such file"),
         (("bare.npy", "--pixel", "one"), "--pixel: found 'one', expected a number, or two"),
-        (("bare.npy", "--pixel", "-1"), "pixel: found -1.0, expected a positive number"),
         (("bare.npy", "--pixel", "1", "--fit", "99"), "found 40 by 30 pixels, expected at"),
         (("bare.npy", "--pixel", "1", "--prune", "5"), "prune: found 5.0, expected a number"),
         (("plane.npy", "--pixel", "1"), "heights: found nothing but a plane"),
@@ -300,7 +297,7 @@ def curve_of(**changed: Any) -> Provability:
     """One that is to be trusted, but for what is changed."""
     good = dict(prune=0.1, heights=0.1, summits=9, contacts=5, undecided=0, scope="global",
                 crowding=0.999, model_error=0.0499, approaches=1.0, loads=1.0)  # fmt: skip
-    size = np.shape(changed.get("prune", [0.1]))
+    size = np.size(changed.get("prune", 0.1))
     return Provability(**{name: np.resize(it, size) for name, it in (good | changed).items()})
 
 
@@ -346,8 +343,7 @@ def test_figures_fit(load: float) -> None:
     named = {f"summits ({some})", f"contacts ({touching:,})", "smooth contact"}
     assert named <= said(figures["map"])
     pairs, _ = crowded(contact)
-    named = {f"{i}, {j}" for i, j in pairs[:1]}
-    assert named <= said(figures["map"])
+    assert {f"{i}, {j}" for i, j in pairs[:1]} <= said(figures["map"])
 
 
 def test_a_map_names_the_unit_of_its_numbers() -> None:
