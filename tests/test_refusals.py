@@ -52,20 +52,17 @@ BAD = [
     (lambda: cr.Asperities([[0, 1], [2, 3], [0, 1]], 1.0), r"asperities 0 and 2 \(from 0\) at a"),
     *((lambda size=size: cr.Asperities(size * np.eye(2), 1.0), "asperities 0 and 1 .* distance of")
       for size in (5e-61, 1e-130, 1e-160)),
-    (lambda: cr.Asperities.square(spacing=1, tip_radius=1, within=1, height_std=1),
-     "seed: found None"),
+    (lambda: cr.Asperities.square(spacing=1, tip_radius=1, within=1, height_std=1), "seed: found"),
     (lambda: cr.press(paper(), approach=1e-80), "choose other units"),
     (lambda: cr.Asperities.hexagonal(spacing=1e-9, tip_radius=1, within=1),
      r"within / spacing = 1e\+09: found 3.63e\+18 asperities .* memory"),
     (lambda: paper("tip"), "geometry: found 'tip'"),
-    (lambda: cr.Scene(1.0, cr.Asperities([[2, 0], [3, 0]], [1.0, 2.0]), MATERIAL),
-     "asperities 0 and 1"),
+    (lambda: cr.Scene(1, cr.Asperities([[2, 0], [3, 0]], [1, 2]), MATERIAL), "asperities 0 and 1"),
     (lambda: cr.press(paper(), load=0.0), "load: found 0.0, expected a positive number"),
     (lambda: cr.press(paper()), "approach, load: found neither"),
     (lambda: cr.press(paper(), approach=1e-5, load=1e-5), "approach, load: found both"),
     # Memory is asked for so many before it is taken.
-    (lambda: cr.press(hexagonal(2e-5, 1e-4), approach=5e-5, influence="dense"),
-     r"could touch: found 9\.07e\+05"),
+    (lambda: cr.press(hexagonal(2e-5, 1e-4), approach=5e-5, influence="dense"), "could touch"),
     (lambda: cr.certify(paper(), np.zeros(61)), "exactly one of the two"),
     (lambda: cr.certify(paper(), -np.ones(61), approach=5e-5), r"loads\[0\]: found -1.0"),
     # Shear.
@@ -78,8 +75,7 @@ BAD = [
     (lambda: cr.shear(BARE, force=1e-9), "coefficient of friction"),
     (lambda: cr.cycle(BARE, maximum=0.0), "coefficient of friction"),
     (lambda: cr.cycle(CONTACT, maximum=1.1 * LIMIT), r"maximum\[0\].*gross sliding"),
-    (lambda: cr.cycle(CONTACT, maximum=0.1 * LIMIT, minimum=0.2 * LIMIT),
-     r"maximum\[0\].*at least the minimum"),
+    (lambda: cr.cycle(CONTACT, maximum=0.1 * LIMIT, minimum=0.2 * LIMIT), "at least the minimum"),
     (lambda: cr.history(CONTACT, forces=[0.0, -2 * LIMIT]), r"forces\[1\].*gross sliding"),
     (lambda: cr.cycle(CONTACT, maximum=LIMIT).loop(10**15), r"points: found 1e\+15 levels \("),
     # Vector friction.
@@ -114,8 +110,7 @@ BAD = [
     (lambda: around_in_phase([1e-8]), "load_amplitude"),
     # Derivatives.
     (lambda: LIFTED.gradient(load=1.0), "a contact with a load"),
-    (lambda: cr.history(CONTACT, forces=[LIMIT]).gradient(losses=[1.0]),
-     "in gross sliding there is no derivative"),
+    (lambda: cr.history(CONTACT, forces=[LIMIT]).gradient(losses=[1.0]), "in gross sliding"),
     (lambda: CONTACT.gradient(loads=[1.0, 2.0]), "61 values, one per asperity"),
     (lambda: cr.cycle(CONTACT, maximum=LIMIT).gradient(holding="approach"), "at constant approach"),
     (lambda: cr.cycle(TOGETHER, maximum=FRICTION * TOGETHER.load).gradient(),
@@ -155,8 +150,7 @@ BAD = [
     (lambda: cr.read_scene(5), "path: found 5, expected the name of a scene file"),
     (lambda: CONTACT.proof(sheared=[1e-8]), r"sheared\[0\]: found 1e-08, expected a shear state"),
     (lambda: CONTACT.proof(sheared=[cr.shear(CONTACT, force=0)]), r"sheared\[0\].*force 0,"),
-    (lambda: CONTACT.proof(sheared=[cr.shear(cr.press(PAPER, load=1e-7), force=0)]),
-     "found a state of another contact, expected a shear state of this contact"),
+    (lambda: CONTACT.proof(sheared=[cr.shear(TOGETHER, force=0)]), "a state of another contact"),
     (lambda: cr.solvers.Newton(max_iterations=1.5), "max_iterations: found 1.5, expected a whole"),
     (lambda: cr.solvers.Newton(tolerance=-1.0), "tolerance: found -1.0, expected a number that is"),
     (lambda: cr.solvers.Conic(max_iterations=-3), "max_iterations: found -3, expected a whole"),
@@ -192,8 +186,7 @@ BAD = [
     (lambda: CONTACT.columns("loads", "load"), "columns: found 'load', expected some of stat"),
     (lambda: cr.testing.assert_agree(CONTACT, cr.shear(CONTACT, force=0)), "type ShearState, exp"),
     (lambda: cr.program(ABOVE.scene, **ABOVE.control), "cones: asperities too dense for a conv"),
-    (lambda: (p := cr.program(PAPER, load=1e-7)).loads(p.data.linear * np.nan),
-     r"values\[0\]: found nan"),
+    (lambda: (p := cr.program(PAPER, load=1e-7)).loads(p.data.linear * np.nan), r"values\[0\]"),
 ]  # fmt: skip
 
 
