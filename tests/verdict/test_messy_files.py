@@ -211,6 +211,7 @@ REFUSED: list[tuple[Any, ...]] = [
     (lambda case: lines(case.table()) + f"Sum:,,{case.loads.sum()}\n", "",
      'row 14: found a row of "Sum:", expected none: remove it: Sum:,,'),
     (lambda case: case.table("X1 y load"), "", "found only y, expected x and y; not used: X1"),
+    (lambda case: case.pixels("X1 X2 pressure"), "", "found neither x nor y, expected both"),
 ]  # fmt: skip
 
 #: As above, with a line for each of several mistakes.
