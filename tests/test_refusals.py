@@ -64,6 +64,7 @@ BAD = [
     # Memory is asked for so many before it is taken.
     (lambda: cr.press(hexagonal(2e-5, 1e-4), approach=5e-5, influence="dense"), "could touch"),
     (lambda: cr.certify(paper(), np.zeros(61)), "exactly one of the two"),
+    (lambda: cr.certify(paper(), np.zeros(60), approach=5e-5), "expected 61 values"),
     (lambda: cr.certify(paper(), -np.ones(61), approach=5e-5), r"loads\[0\]: found -1.0"),
     # Shear.
     (lambda: cr.shear(CONTACT, force=1.01 * LIMIT), r"1\.01 f P: gross sliding"),
@@ -125,6 +126,7 @@ BAD = [
     (lambda: HERTZ.traction(0.0, [0.0, -1.01 * LIMIT, 2 * LIMIT]), r"force\[1\].*gross sliding"),
     (lambda: HERTZ.energy(0.0, -2 * LIMIT), r"minimum: found.*gross sliding"),
     (lambda: HERTZ.energy(0.0, LIMIT / 2), r"maximum: found 0.*at least the minimum"),
+    (lambda: HERTZ.displacement(np.nan), r"force: found nan"),
     (lambda: HERTZ.branch([0.0, 0.55 * LIMIT], LIMIT / 2), r"found.*at most the turning force"),
     (lambda: cr.smooth(paper(), load=0.0), r"load.*positive"),
     # Values of other types.

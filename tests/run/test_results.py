@@ -271,6 +271,16 @@ def test_a_state_without_a_proof_does_not_cost_the_others(run: Any, tmp_path: Pa
     assert len(json.loads(Path("a-results/proof.json").read_text())["sheared"]) == 1
 
 
+def test_without_a_proof_the_status_says_so(run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: Any) -> None:
+        raise cr.ProofError("nothing is proved")
+
+    monkeypatch.setattr("convexrough.run.results.prove_results", refuse)
+    ran = run(scene_text(), "--proof")
+    said = "convexrough: warning: proof.json is not written: nothing is proved\n"
+    assert (ran.status, ran.err) == (3, said)
+
+
 def test_a_scene_too_large_to_prove_is_refused(run: Any) -> None:
     ran = run(scene_text(f"{HEXAGONAL}within = 0.08"), "--proof")
     assert ran.refuses("a.toml: asperities of a scene to prove")

@@ -157,6 +157,7 @@ def test_summits_on_filled_pixels_are_counted(find: Any, surface: cr.surface.Sur
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        (("bare.npy", "--pixel", "-1"), "pixel: found -1.0, expected a positive number"),
         (("bare.npy", "--pixel", "one"), "--pixel: found 'one', expected a number, or two"),
         (("bare.npy", "--pixel", "1", "--fit", "99"), "found 40 by 30 pixels, expected at"),
         (("bare.npy", "--pixel", "1", "--prune", "5"), "prune: found 5.0, expected a number"),

@@ -253,6 +253,7 @@ def test_a_figure_has_a_logarithmic_axis_for_decades_and_says_what_a_band_pools(
     table = swept(sweeping(over=over, measure=["load", "contact"]))
     load, contact = (table.plot(name, "sphere.radius") for name in ("load", "contact"))
     assert (load.get_yscale(), contact.get_yscale()) == ("log", "linear")
+    assert table.plot("load", "normal.load").get_xscale() == "log"
     assert "all load, coefficient: 6 combinations" in contact.get_legend().get_texts()[0].get_text()
 
 

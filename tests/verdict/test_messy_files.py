@@ -134,6 +134,7 @@ READ: list[tuple[Any, ...]] = [
     (lambda case: shuffled(case) | {"rank": np.arange(COUNT)[::-1]},),
     (lambda case: german(case.table()), "a.csv.gz"),
     *((lambda case, form=form: {"result": form(case.table())}, "a.mat") for form in (matrix, dict)),
+    (lambda case: {"load": case.loads, "more": "a note"}, "a.mat"),  # a row of loads
     (lambda case: [[["# Run 7"], [], *cells(case.table("x\xa0[m] y\xa0[m] load\xa0[N]"))],
                    [["notes"]]], "a.xlsx"),
     (shuffled,),
@@ -222,6 +223,9 @@ REFUSED_ROWS: list[tuple[Any, ...]] = [
     (lambda case: "Run 7\n\n" + lines(case.table()), "",
      "columns: found Run 7, expected a column 'load'; remove the lines above the names ",
      "row 3: found 3 cells, expected 1, as in the header: x,y,load"),
+    (lambda case: (text := lines(case.table())) + text.splitlines()[3] + "\n", "",
+     "rows: found 13, expected 12, one per asperity of the scene\n",
+     "row 14: found the same position as in row 4, expected each asperity once"),
     (lambda case: lines(case.table(), ",", ","), "", "row 2: found 6 cells, expected 3, as in the"),
     ("x;y;load\n" + 9 * "0,5;1,5;1.234,5\n", "",
      "row 2, column load: found '1.234,5', expected a decimal comma and no thousands sep"),

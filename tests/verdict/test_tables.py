@@ -263,6 +263,7 @@ KEYED = Reading(keyed=True)  # as for the file of a scene
 
 WRONG_SUMMITS = [
     ("", "empty"),
+    ("x,y\n", "rows: found none below the header"),
     ("x,y,heigth\n0,0,0\n", "found 'heigth', expected a known column; did you mean \"height\", or "
      'columns = {height = "heigth"} in [asperities]?'),
     ("X-Koord. [m],Y-Koord. [m],z,R\n0,0,0,1\n", "expected a column 'x': rename one, or columns = "

@@ -238,11 +238,13 @@ def test_wrong_use(command: Any, contact: cr.Contact) -> None:
     loads = claim(contact)
     for wrong, expected in (
         (("--shear", loads), "--shear and --shear-force go together"),
+        (("--shear-force", "1"), "--shear and --shear-force go together"),
+        (("--within", "0"), "--within: found 0.0, expected a positive number"),
         (("--within", "5"), "; 5 % is 0.05"),
         (("--tolerance", "-1"), "--tolerance: found -1.0"),
         (("--tolerance", "1"), "--tolerance: found 1.0, expected at most 0.00125, half the small"),
         (("--sign", "-1"), "no load is positive, expected positive compression: without --sign -1"),
-        (("--floor", "nan"), "--floor: found nan"),
+        (("--floor", "-1"), "--floor: found -1.0"),
         (("--column", "x=x", "coord"), "hint: quote names that contain spaces"),
         (("--shear", loads, "--shear-force", "1", "--column", "force=load"), "force: found 1.0 ("),
     ):
