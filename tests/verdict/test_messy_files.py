@@ -26,7 +26,8 @@ PLACES = 5e-5 * (GRID + RNG.uniform(-0.2, 0.2, GRID.shape))
 HEIGHTS = RNG.uniform(-3e-7, 0, COUNT)
 XY = {"x": PLACES[:, 0], "y": PLACES[:, 1]}
 SUMMITS = XY | {"height": HEIGHTS}
-MEANS = {name: np.round([*each, each.mean()], 12) for name, each in SUMMITS.items()}
+MEANS, SUMS = ({name: np.round([*each, total(each)], 12) for name, each in SUMMITS.items()}
+               for total in (np.mean, np.sum))  # fmt: skip
 BODIES = """sphere = {youngs_modulus = 210e9, poisson_ratio = 0.3}
 base = {youngs_modulus = 70, poisson_ratio = 0.3}"""
 STEEL, METRES = "youngs_modulus = 210e9", 'length = "m"\nforce = "N"'
@@ -413,6 +414,7 @@ def test_results_say_their_units(case: Case) -> None:
         (UM | NM, "", "column height: found nm, expected µm, as x"),
         (XY | {"id": np.roll(np.arange(COUNT), 1)}, METRES, "column id: found "),
         (MEANS, METRES, "row 14: found the means of the other rows, expected an"),
+        (SUMS, METRES, "row 14: found the sums of the other rows, expected an"),
         (XY | {"mean_pressure": HEIGHTS, "rise": HEIGHTS}, METRES, "columns: found rise, but no"),
     ],
 )
