@@ -257,6 +257,10 @@ def test_verify_proves_loads_and_overwrites_nothing(command: Any, tmp_path: Path
     said = "warning: proof.json is not written: the given loads are not accepted"
     assert said in wrong.err
     assert not (tmp_path / "proof.json").exists()  # an earlier proof does not stand beside it
+    (tmp_path / "b.toml").write_text(scene_text(WITHIN, "load = 3.6e-7"))
+    (tmp_path / "loads.csv").write_text("load\n" + "0\n" * 61)
+    wrong = command("verify", "b.toml", "loads.csv", "--proof")
+    assert (wrong.status, said in wrong.err) == (3, True)
 
 
 def test_a_state_without_a_proof_does_not_cost_the_others(run: Any, tmp_path: Path) -> None:

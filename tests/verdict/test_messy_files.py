@@ -232,6 +232,8 @@ REFUSED_ROWS: list[tuple[Any, ...]] = [
      "row 2, column load: found '1.234,5', expected a decimal comma and no thousands sep"),
     (lambda case: {"index": [0, *range(COUNT - 1)], "load": case.loads}, "",
      "column index: found 0 in row 2 and row 3"),
+    (lambda case: lines(shuffled(case)) + ",1.5\n", "", "; --nodes sums rows by asperity",
+     "column index: found '' in row 14, expected whole numbers"),
     (lambda case: shuffled(case, 1) | {"asperity": np.arange(COUNT)[::-1]}, "",
      "columns index, asperity: found other asperities in each, expected one ind"),
     ({"index": [3, 4, 5], "load": [1, 2, 3]}, "", "found numbers from 3 to 5, expected either 0,",
