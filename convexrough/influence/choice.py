@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import get_args
 
 from convexrough.arrays import Indices
@@ -55,4 +56,5 @@ def couple(scene: Scene, which: Indices, scale: float, kind: Kind | None = None)
 
 def _whole(layout: Layout) -> DenseInfluence:
     """1 / r_ij between all points of a small layout, shared by all scenes with it."""
-    return DenseInfluence.assemble(layout.points, 1.0)
+    made = DenseInfluence.assemble(layout.points, 1.0)
+    return replace(made, sums=replace(made.sums, shared=True))

@@ -155,6 +155,7 @@ class MatrixSums:
     point_error: float = 0.0  # [length] bound on the error of each coordinate
     #: The sums of more points, and the increasing indices of these points among them.
     part_of: tuple[MatrixSums, Indices] | None = None
+    shared: bool = False  # True if other scenes use this object: no bit may depend on them
 
     def restricted(self, which: Indices) -> MatrixSums:
         """The same sums of some of the points only."""
@@ -176,11 +177,11 @@ class MatrixSums:
 
     @cached_property
     def _matrix(self) -> SlicedMatrix:
-        """The matrix, cut from that of `part_of` if the latter is cached or small enough."""
+        """The matrix, cut from that of `part_of` if this is small, or cached and not shared."""
         if self.part_of is not None:
             whole, which = self.part_of
             few = len(whole.points.high) <= min(KEPT, max(SMALL, 2 * len(which)))
-            if few or "_matrix" in vars(whole):
+            if few or ("_matrix" in vars(whole) and not whole.shared):
                 return whole._matrix.restricted(which)
         return SlicedMatrix.of(self.points, slice(0, None), self.point_error)
 
