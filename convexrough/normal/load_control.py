@@ -98,7 +98,7 @@ def approach_bound(
         excess, slope = summed(parts), summed(parts * nearer)
         step = (np.cbrt(excess / wanted) - 1.0) * excess / slope
         height = height + np.fmax(step, 0.0)  # a step of nan: the height is large enough
-        if not (step > 1e-3 * (height - least)).any():
+        if not (step > 0.03 * (height - least)).any():
             break  # any height gives a bound; this one is close to the best
     height = np.maximum(height, highest)
     rest = (4.0 / 27.0) * summed(cubes / (height - active) ** 2)
