@@ -25,6 +25,9 @@ from convexrough.sphere import hertz, surface_shear
 #: Number of pairs of a point and an asperity that are evaluated at a time; they fit in a cache.
 BLOCK = 2**14
 
+#: Largest number of such pairs for which all distances are computed. Affects speed only.
+FEW_PAIRS = 2**20
+
 
 def peak_pressures(contact: Contact) -> Array:
     """(n,) [force / length^2] peak pressures p0_i = 2 E* a_i / (pi R_i); 0 where open.
@@ -160,12 +163,16 @@ def _sum_over_discs(
     points: ArrayLike, centres: Array, radii: Array, profile: Callable[[Array, Indices], Array]
 ) -> Array:
     """(...) sum_i profile(|r - r_i|, i) over the discs that may contain the point r."""
-    from scipy.spatial import cKDTree  # takes 0.1 s to import
-
     flat, shape = _places(points)
-    near = cKDTree(flat).query_ball_point(centres, radii)
-    disc = np.repeat(np.arange(len(centres)), [len(inside) for inside in near])
-    point = np.array([i for inside in near for i in inside], dtype=np.intp)
+    if len(flat) * len(centres) <= FEW_PAIRS:
+        apart = np.hypot(*(flat.T[:, None] - centres.T[:, :, None]))
+        disc, point = np.nonzero(apart <= radii[:, None])
+    else:
+        from scipy.spatial import cKDTree  # takes 0.1 s to import
+
+        near = cKDTree(flat).query_ball_point(centres, radii)
+        disc = np.repeat(np.arange(len(centres)), [len(inside) for inside in near])
+        point = np.array([i for inside in near for i in inside], dtype=np.intp)
     total = np.zeros(len(flat))
     np.add.at(total, point, profile(np.hypot(*(flat[point] - centres[disc]).T), disc))
     return total.reshape(shape)

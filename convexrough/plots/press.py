@@ -176,12 +176,16 @@ def _draw_smooth_share(axes: Axes, scale: Scale) -> None:
     """Draw 100 p(r) A / P for the smooth sphere, with the median cell area A of asperities."""
     if len(set(scale.axes)) != 1:
         return
-    sample = np.argsort(np.hypot(*scale.points.T))[:5000]  # at most 5000, nearest the axis
-    areas = fields.cell_areas(scale.points[sample])
-    whole = np.isfinite(areas) & (scale.contact.loads[sample] > 0)
-    if whole.sum() < 7:
+    scene, touching = scale.contact.scene, scale.contact.loads > 0
+    if scene.lattice is not None and scene.asperities.layout.made is not None:  # no site is vacant
+        areas = np.full(touching.sum(), abs(np.linalg.det(scene.lattice.basis)))
+    else:
+        sample = np.argsort(np.hypot(*scale.points.T))[:5000]  # at most 5000, nearest the axis
+        areas = fields.cell_areas(scale.points[sample])[touching[sample]]
+        areas = areas[np.isfinite(areas)]
+    if len(areas) < 7:
         return
     s = TOWARDS_RIM[40:]
-    share = hertz.pressure(s, 1.0, 150.0 / np.pi) * np.median(areas[whole]) / scale.typical**2
+    share = hertz.pressure(s, 1.0, 150.0 / np.pi) * np.median(areas) / scale.typical**2
     axes.plot(scale.length.of(scale.typical) * s, share, "--", lw=1.1, color=ink(),
               label="smooth $p(r)$ × cell area")  # fmt: skip
