@@ -16,6 +16,7 @@ from convexrough.influence.choice import FEW_ASPERITIES
 from convexrough.influence.coupling import Coupling
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.base import along
+from convexrough.scene.layout import MANY
 from convexrough.scene.scene import Scene
 from convexrough.sphere import hertz
 
@@ -132,10 +133,12 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
 def _bound_by_discs(scene: Scene, load: float) -> float:
     """`highest_approach` by (3) of docs/theory/certificate.md, from discs about asperities that do
     not overlap; nan where it would be poor (`COVERED`)."""
-    lattice, modulus = scene.lattice, scene.material.contact_modulus
+    layout, modulus = scene.asperities.layout, scene.material.contact_modulus
     if np.inf in along(scene.sphere_radius):  # flats and cylinders
         return np.nan
-    if lattice is not None:
+    # To find out whether few given points form a lattice takes too long.
+    known = layout.made is not None or len(layout.points) > MANY
+    if known and (lattice := scene.lattice) is not None:
         radii = even(0.5 * lattice.spacing - 1.5 * lattice.site_error, len(scene))
     else:
         radii = np.maximum(0.5 * scene.nearest * (1 - SAFETY) - 1.5 * scene.point_error, 0.0)
@@ -188,8 +191,9 @@ def _bound_within(reach: float, scene: Scene, load: float, influence: Kind | Non
         return np.nan
     indentation, least = smooth_indentations(scene, load, near)
     weights = np.maximum(indentation, 0.0)
-    one_box = scene.lattice is not None and influence in (None, "lattice")
-    every = one_box or len(near) <= FEW_ASPERITIES
+    few = len(near) <= FEW_ASPERITIES
+    one_box = not few and scene.lattice is not None and influence in (None, "lattice")
+    every = one_box or few
     which = np.arange(len(near)) if every else np.flatnonzero(weights)
     sources = couple(scene, near[which], 1.0 / (np.pi * modulus), influence)
     radii = taken(scene.relative_radii, near)
