@@ -58,6 +58,7 @@ BAD = [
      r"within / spacing = 1e\+09: found 3.63e\+18 asperities .* memory"),
     (lambda: paper("tip"), "geometry: found 'tip'"),
     (lambda: cr.Scene(1, cr.Asperities([[2, 0], [3, 0]], [1, 2]), MATERIAL), "asperities 0 and 1"),
+    (lambda: cr.verify(paper(), -np.ones(61), approach=5e-5), "is the sign reversed"),
     (lambda: cr.press(paper(), load=0.0), "load: found 0.0, expected a positive number"),
     (lambda: cr.press(paper()), "approach, load: found neither"),
     (lambda: cr.press(paper(), approach=1e-5, load=1e-5), "approach, load: found both"),

@@ -26,13 +26,13 @@ from convexrough.sphere import hertz
 LEAST_REACH, WIDER = 1.5, 4.0 / 3.0
 
 #: `_bound_by_discs` is used if its discs cover at least the part COVERED of a rectangle about them,
-#: and if the mean depth of their asperities below the highest one is at most DEEP times the bound's
-#: height above the first contact (1/3 for a smooth sphere). Heuristics: elsewhere the bound holds,
-#: but is poor.
+#: and if the weighted mean depth of their asperities below the highest one is at most DEEP times
+#: the bound's height above the first contact (1/3 for a smooth sphere). Heuristics: elsewhere the
+#: bound holds, but is poor.
 COVERED, DEEP = 0.45, 0.45
 
-#: Largest depths below the highest asperity that are tried: these parts of the indentation of one
-#: asperity under the whole load, four for each factor of 2.
+#: Largest depths below the highest asperity that are tried, divided by about the indentation of the
+#: sharpest asperity under the whole load: four for each factor of 2.
 DEPTHS = 2.0 ** (np.arange(-160, 1) / 4.0)
 
 #: Relative change below which the shift tau of `shifted_to_load` counts as converged. A heuristic:
@@ -132,7 +132,7 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
 @np.errstate(all="ignore")
 def _bound_by_discs(scene: Scene, load: float) -> float:
     """`highest_approach` by (3) of docs/theory/certificate.md, from discs about asperities that do
-    not overlap; nan where it would be poor (`COVERED`)."""
+    not overlap; nan where it would be poor (`COVERED`, `DEEP`)."""
     layout, modulus = scene.asperities.layout, scene.material.contact_modulus
     if np.inf in along(scene.sphere_radius):  # flats and cylinders
         return np.nan
@@ -144,36 +144,38 @@ def _bound_by_discs(scene: Scene, load: float) -> float:
         radii = np.maximum(0.5 * scene.nearest * (1 - SAFETY) - 1.5 * scene.point_error, 0.0)
     k = evenly(partial(hertz.local_coefficient, modulus), scene.relative_radii)
     sharpest, widest = float(k.max()), float(radii.max())
-    usual = k[0] if k.strides == (0,) else np.median(k)
+    usual = float(k[0] if k.strides == (0,) else np.median(k))
     weights = evenly(np.square, radii / widest) * np.minimum(1.0, (usual / k) ** 1.5)
     offsets = scene.offsets - scene.offset_errors
-    depths, top, locally = offsets.max() - offsets, float(offsets.max()), weights * (k / sharpest)
+    depths, top, locally = offsets.max() - offsets, float(offsets.max()), weights * (k / usual)
     alone = hertz.indentation(load, sharpest) + load / (np.pi * modulus * widest)
     group = np.searchsorted(limits := alone * DEPTHS, depths)
     whole, cubes, below = (
         np.cumsum(np.bincount(group, each, len(DEPTHS) + 1)[:-1])
         for each in (weights, locally * locally * locally, weights * depths)
     )
-    local = sharpest * np.cbrt(cubes) / whole * load ** (2.0 / 3.0)
+    local = usual * np.cbrt(cubes) / whole * load ** (2.0 / 3.0)
     moved = load / (np.pi * modulus * widest) * most_potential(whole, float(radii.min()) / widest)
     depth, above = below / whole, local + moved + below / whole
     bounds = above - top + (SAFETY + len(depths) * ROUNDOFF) * (above + abs(top))
-    # Weights only on asperities that can touch: so it also holds for the scene of these alone.
+    # Only asperities that can touch have weights, so the bound holds for the scene of these alone.
     best = np.where(limits - top < bounds, bounds, np.inf).argmin()
     chosen = depths <= limits[best]
     x, y = (2.0 * widest + np.ptp(each[chosen]) for each in scene.contact_points.T)
     covers = np.pi * float((radii[chosen] ** 2).sum()) >= COVERED * float(x * y)
     good = limits[best] - top < bounds[best] < np.inf and depth[best] <= DEEP * above[best]
+    good &= whole[best] > 1e-50  # else cubes may underflow
     return float(bounds[best]) if covers and good else np.nan
 
 
-def most_potential(areas: Any, least: float) -> Any:
-    """Upper bounds on the sum of q_j / r_ij over j other than i, with weights q_j = s_j^2 / `areas`
-    on some of several discs that do not overlap: docs/theory/certificate.md, before (3).
+def most_potential(whole: Any, least: float) -> Any:
+    """Upper bounds on the sum of q_j / r_ij over j other than i, with weights q_j = v_j / `whole`
+    and v_j at most s_j^2, for radii s_j of discs that do not overlap: docs/theory/certificate.md,
+    before (3).
 
-    areas : sum of s_j^2 for the radii s_j of these discs;  least : the smallest radius of all discs
+    whole : the sum of the v_j;  least : the smallest radius of all discs
     """
-    return 2.0 * (np.sqrt(areas + least * least) - least) / areas
+    return 2.0 / (np.sqrt(whole + least * least) + least)
 
 
 @np.errstate(all="ignore")

@@ -85,7 +85,7 @@ def test_a_close_pair_does_not_make_candidates_of_all(kind: Kind) -> None:
 def test_the_bound_in_a_wide_scene(
     within: float, spacing: float, raised: dict[int, float], kind: Kind | None
 ) -> None:
-    """It is close. Off a lattice it comes from asperities near the axis where this is enough."""
+    """It is close. Without discs it comes from asperities near the axis where this is enough."""
     regular = cr.Asperities.hexagonal(spacing=spacing, tip_radius=0.01, within=within)
     if kind is not None:
         moved = np.random.default_rng(0).uniform(-0.3, 0.3, (len(regular), 2)) * spacing
@@ -118,6 +118,51 @@ def test_the_displacements_that_bound_the_approach() -> None:
                 bound = load_control.most_potential(whole, np.sqrt(areas.min()))
                 closest.append(most / bound)
     assert 0.9 < max(closest) < 1.0
+    assert load_control.most_potential(1e-30, 1.0) == pytest.approx(1.0, rel=1e-15)
+
+
+@pytest.mark.parametrize(("moved", "spread"), [(0.0, 0.0), (0.0, 2.0), (0.15, 0.0), (0.15, 2.0)])
+def test_the_bound_by_discs_is_that_of_exact_displacements_or_more(
+    moved: float, spread: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With the same weights, and sums of q / r over all pairs. On a lattice it is hardly more."""
+    monkeypatch.setattr(load_control, "COVERED", 0.0)
+    monkeypatch.setattr(load_control, "DEEP", np.inf)
+    random, modulus = np.random.default_rng(0), scenes.MATERIAL.contact_modulus
+    regular = cr.Asperities.hexagonal(spacing=0.001, tip_radius=1.0, within=0.0155)
+    points = regular.positions + random.uniform(-moved, moved, (len(regular), 2)) * 0.001
+    points[1] = points[1] if moved == 0 else points[0] + [1e-6, 0.0]
+    tips = 0.01 * 10.0 ** (spread * random.uniform(-1, 1, len(points)))
+    own = regular.with_tips(tips) if moved == 0 else cr.Asperities(points, tips)
+    scene = cr.Scene(1.0, own, scenes.MATERIAL)
+    apart = np.linalg.norm(points[:, None] - points, axis=2)
+    np.fill_diagonal(apart, np.inf)
+    k = (9.0 / (16.0 * modulus**2 * scene.relative_radii)) ** (1.0 / 3.0)
+    v = (apart.min(axis=0) / 2) ** 2 * np.minimum(1.0, (np.median(k) / k) ** 1.5)
+    deepest, d = scene.offsets.argsort()[::-1], scene.offsets
+    for load in (1e-9, 1e-8, 1e-7):
+        exact = []
+        for m in range(1, len(points), 3):
+            q = np.where(np.isin(np.arange(len(points)), deepest[:m]), v, 0.0)
+            q /= q.sum()
+            local = load ** (2 / 3) * ((q * k) ** 3).sum() ** (1 / 3)
+            exact.append(local + load / (np.pi * modulus) * (q / apart).sum(axis=1).max() - q @ d)
+        bound = load_control._bound_by_discs(scene, load)
+        loose = 1.05 if moved == spread == 0 else 2.0
+        assert min(exact) * (1 - 1e-12) <= bound <= min(exact) * loose
+
+
+def test_the_bound_counts_what_asperities_far_out_are_displaced() -> None:
+    """A far asperity beside the contact may be displaced most by the weights, and touch alone."""
+    load, heights = 1e-6, np.array([0.0, 0.0, -1.3e-4])
+    reach = np.sqrt((1.5 * (0.75 * load) ** (1 / 3)) ** 2 + 2.0 * (heights.max() - heights.mean()))
+    points = reach * np.array([[0.9999, 0.0], [-0.9999, 0.0], [1.0001, 0.0]])
+    other = cr.press(scenes.on_sphere(points[1:], 0.1, heights[1:]), load=load)
+    scene = scenes.on_sphere(points, 0.1, heights)
+    away = np.linalg.norm(points[0] - points[1:], axis=1)
+    pushed = (other.loads / (np.pi * scene.material.contact_modulus * away)).sum()
+    assert pushed - scene.offsets[0] > other.approach  # so this is a solution of the whole scene
+    assert highest_approach(scene, load) >= other.approach
 
 
 @pytest.mark.parametrize(
@@ -136,12 +181,13 @@ def test_the_bound_at_a_load_that_is_tiny_for_the_scene(
     assert contact.candidates == (1 if np.isfinite(sphere_radius) else len(scene) - 1)
 
 
-def test_low_sites_beside_large_contacts_are_no_candidates() -> None:
+@pytest.mark.parametrize("sphere_radius", [np.inf, 1e5])
+def test_low_sites_beside_large_contacts_are_no_candidates(sphere_radius: float) -> None:
     """Contacts at every third site, with discs wider than the spacing, have one solution."""
     sites = np.indices((30, 30)).reshape(2, -1).T
     positions = (sites - 15) @ np.array([[1.0, 0.0], [0.5, np.sqrt(0.75)]])
     heights = np.where((sites % 3 == 0).all(axis=1), 0.0, -0.16)
-    scene = cr.Scene(np.inf, cr.Asperities(positions, 30.0, heights), scenes.MATERIAL)
+    scene = cr.Scene(sphere_radius, cr.Asperities(positions, 30.0, heights), scenes.MATERIAL)
     contact = cr.press(scene, load=cr.press(scene, approach=0.13).load)
     assert (contact.certificate.scope, contact.candidates) == ("global", 100)
 

@@ -279,6 +279,16 @@ def test_the_colours_and_the_profile_show_the_pressure() -> None:
     assert chart.get_xlim() == profile.get_xlim()
 
 
+def test_the_curve_of_the_smooth_sphere_uses_the_area_of_a_cell() -> None:
+    """That of the lattice, if the points were made on one; else the median of Voronoi's cells."""
+    given = cr.Asperities(PAPER.asperities.positions, PAPER.asperities.tip_radii)
+    curves = []
+    for each in (PAPER.asperities, given):
+        pressed = cr.press(dataclasses.replace(PAPER, asperities=each), approach=PAPER_APPROACH)
+        curves.append(plots.press_figures(pressed)["loads"].axes[0].lines[0].get_ydata())
+    assert_allclose(*curves, rtol=1e-12)
+
+
 def test_files_keep_their_text_and_pixels(tmp_path: Path) -> None:
     figure = Figure(figsize=(1, 1))
     figure.subplots().set_xlabel("load [mN]")
