@@ -157,7 +157,8 @@ def _bound_by_discs(scene: Scene, load: float) -> float:
     local = usual * np.cbrt(cubes) / whole * load ** (2.0 / 3.0)
     moved = load / (np.pi * modulus * widest) * most_potential(whole, float(radii.min()) / widest)
     depth, above = below / whole, local + moved + below / whole
-    bounds = above - top + (SAFETY + len(depths) * ROUNDOFF) * (above + abs(top))
+    rounding = SAFETY + 4 * len(depths) * ROUNDOFF  # quotients of two sums, one term after another
+    bounds = above - top + rounding * (above + abs(top))
     # Only asperities that can touch have weights, so the bound holds for the scene of these alone.
     best = np.where(limits - top < bounds, bounds, np.inf).argmin()
     chosen = depths <= limits[best]

@@ -1,6 +1,7 @@
 """The normal problem: derivatives, bounds, convexity, known answers, and extreme units."""
 
 import itertools
+import math
 from functools import partial
 from typing import Any
 
@@ -150,6 +151,22 @@ def test_the_bound_by_discs_is_that_of_exact_displacements_or_more(
         bound = load_control._bound_by_discs(scene, load)
         loose = 1.05 if moved == spread == 0 else 2.0
         assert min(exact) * (1 - 1e-12) <= bound <= min(exact) * loose
+
+
+def test_the_bound_by_discs_counts_the_rounding_of_its_sums() -> None:
+    """Weights of sharp tips are half a unit in the last place of the sum that they are added to."""
+    sharp, side = 2.0**-100, 400
+    blunt = np.array([it for it in itertools.product(range(3), range(3)) if any(it)], dtype=float)
+    many = -np.indices((side, side)).reshape(2, -1).T * 2.0**-25 * 1.0005
+    points = np.vstack((blunt, many))
+    tips = np.where(np.arange(len(points)) < 8, 1.0, sharp)
+    heights = -(2.0**-94) * np.where(tips == 1.0, 1.0, 0.998)
+    heights[-1] = 0.0
+    scene = cr.Scene(1e60, cr.Asperities(points, tips, heights), cr.Material(1.0, 0.3))
+    k = (9.0 / (16.0 * scene.relative_radii)) ** (1.0 / 3.0)
+    loads = ((2.0**-94 / 0.44 + heights) / k) ** 1.5
+    least = (k * loads ** (2.0 / 3.0) - heights).min()  # without A P
+    assert load_control._bound_by_discs(scene, math.fsum(loads) * (1 + 1e-15)) >= least
 
 
 def test_the_bound_counts_what_asperities_far_out_are_displaced() -> None:
