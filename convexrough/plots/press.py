@@ -178,7 +178,8 @@ def _draw_smooth_share(axes: Axes, scale: Scale) -> None:
         return
     scene, touching = scale.contact.scene, scale.contact.loads > 0
     if scene.lattice is not None and scene.asperities.layout.made is not None:  # no site is vacant
-        areas = np.full(touching.sum(), abs(np.linalg.det(scene.lattice.basis)))
+        inside = scale.distances < scale.distances.max() - 0.75 * scene.lattice.spacing
+        areas = np.full((touching & inside).sum(), abs(np.linalg.det(scene.lattice.basis)))
     else:
         sample = np.argsort(np.hypot(*scale.points.T))[:5000]  # at most 5000, nearest the axis
         areas = fields.cell_areas(scale.points[sample])[touching[sample]]

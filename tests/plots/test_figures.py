@@ -287,6 +287,10 @@ def test_the_curve_of_the_smooth_sphere_uses_the_area_of_a_cell() -> None:
         pressed = cr.press(dataclasses.replace(PAPER, asperities=each), approach=PAPER_APPROACH)
         curves.append(plots.press_figures(pressed)["loads"].axes[0].lines[0].get_ydata())
     assert_allclose(*curves, rtol=1e-12)
+    for small in (cr.Asperities.hexagonal, cr.Asperities.square):  # hardly a cell is inside
+        few = small(spacing=0.0025, tip_radius=0.02, within=0.0025)
+        pressed = cr.press(dataclasses.replace(PAPER, asperities=few), approach=PAPER_APPROACH)
+        assert len(plots.press_figures(pressed)["loads"].axes[0].lines) == 1
 
 
 def test_files_keep_their_text_and_pixels(tmp_path: Path) -> None:
