@@ -20,7 +20,7 @@ from convexrough.contact import Contact
 from convexrough.errors import InputError
 from convexrough.friction.cycle import Cycle
 from convexrough.friction.path import LoadPath
-from convexrough.plots.style import SINGLE, Scale, legend, say_nothing
+from convexrough.plots.style import SINGLE, Scale, few_ticks, legend, say_nothing
 
 #: The module and the function that draw a result into axes, by the name of the result's class. A
 #: module is imported only when its function is needed.
@@ -84,15 +84,21 @@ def panels(
 ) -> tuple[Figure, list[Axes]]:
     """A new figure of this size [inches], and its axes, row by row."""
     figure = Figure(figsize=(width, height), layout="constrained")
-    return figure, figure.subplots(rows, columns, squeeze=False, **how).ravel().tolist()
+    places = figure.subplots(rows, columns, squeeze=False, **how).ravel().tolist()
+    for axes in places:
+        few_ticks(axes)
+    return figure, places
 
 
 def new_axes(size: tuple[float, float]) -> Axes:
     """The axes of a new figure of this size [inches]; `pyplot.show` shows it if pyplot is used."""
+    axes: Axes
     if pyplot := sys.modules.get("matplotlib.pyplot"):
-        axes: Axes = pyplot.figure(figsize=size, layout="constrained").subplots()
-        return axes
-    return Figure(figsize=size, layout="constrained").add_subplot(axes_class=ShownAxes)
+        axes = pyplot.figure(figsize=size, layout="constrained").subplots()
+    else:
+        axes = Figure(figsize=size, layout="constrained").add_subplot(axes_class=ShownAxes)
+    few_ticks(axes)
+    return axes
 
 
 def no_contact(*stems: str) -> Figures:

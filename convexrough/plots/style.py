@@ -83,7 +83,7 @@ def halo() -> tuple[AbstractPathEffect, ...]:
 
 def bar(axes: Axes, mapped: ScalarMappable, name: str, *, above: bool = False) -> None:
     """A colour bar, added to the right of the axes, with its name above it or along it."""
-    found = axes.figure.colorbar(mapped, ax=axes, aspect=28, pad=0.02)
+    found = axes.figure.colorbar(mapped, ax=axes, aspect=28, pad=0.02, ticks=round_ticks())
     label(found.ax, "", "" if above else name)
     if above:
         # Centred, a long name would leave the figure; 2.3 widths are at most where ticks end.
@@ -100,8 +100,14 @@ def disc_handle(colour: str, text: str) -> Line2D:
     return Line2D([], [], ls="", marker="o", ms=6, mew=0.4, mec=SMOOTH, mfc=colour, label=text)
 
 
-def round_ticks(most: int = 6, *, whole: bool = False) -> MaxNLocator:
+def round_ticks(most: int = 5, *, whole: bool = False) -> MaxNLocator:
     return MaxNLocator(most, steps=[1, 2, 5, 10], integer=whole)
+
+
+def few_ticks(axes: Axes) -> None:
+    """At most 6 ticks along each axis; each tick is measured several times when it is drawn."""
+    axes.xaxis.set_major_locator(round_ticks())
+    axes.yaxis.set_major_locator(round_ticks())
 
 
 def log_ticks(axis: Axis, most: int = 6) -> None:
