@@ -114,16 +114,11 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
     indentations `smooth_indentations` as weights. Where contact discs would reach their nearest
     neighbours, the indentations are reduced, as the bound would be useless.
     """
-    bound, reaches = _bound_by_discs(scene, load), [np.inf]
-    if scene.curved:
-        radius, heights = scene.mean_radius, scene.asperities.heights
-        a = float(hertz.contact_radius(load, scene.material.contact_modulus, radius))
-        beyond = 2.0 * radius * (heights.max() - heights.mean())
-        reach = float(np.sqrt((LEAST_REACH * a) ** 2 + beyond))
-        reaches = [reach, 2.0 * reach, 4.0 * reach, np.inf]
-    for reach in reaches:
-        if np.isnan(bound):
-            bound = _bound_within(reach, scene, load, influence)
+    bound = _bound_by_discs(scene, load)
+    for reach in _reaches(scene, load) if np.isnan(bound) else ():
+        bound = _bound_within(reach, scene, load, influence)
+        if not np.isnan(bound):
+            break
     if not np.isfinite(bound):
         raise InputError("load", found=load, expected="a load within the range of float64")
     return bound
@@ -177,6 +172,22 @@ def most_potential(whole: Any, least: float) -> Any:
     whole : the sum of the v_j;  least : the smallest radius of all discs
     """
     return 2.0 / (np.sqrt(whole + least * least) + least)
+
+
+@np.errstate(all="ignore")
+def _reaches(scene: Scene, load: float) -> list[float]:
+    """Distances from the axis [length] that `_bound_within` tries: beyond the first, a smooth
+    contact, widened by high asperities or by the indentations of asperities, is probably open."""
+    if not scene.curved:
+        return [np.inf]
+    radius, modulus = scene.mean_radius, scene.material.contact_modulus
+    a = float(hertz.contact_radius(load, modulus, radius))
+    heights = scene.asperities.heights
+    inside = np.count_nonzero(np.hypot(*scene.contact_points.T) < a) + 1
+    k = hertz.local_coefficient(modulus, scene.relative_radii.mean())
+    beyond = max(heights.max() - heights.mean(), hertz.indentation(load / inside, k))
+    reach = float(np.sqrt((LEAST_REACH * a) ** 2 + 2.0 * radius * beyond))
+    return [reach, 2.0 * reach, 4.0 * reach, np.inf]
 
 
 @np.errstate(all="ignore")
