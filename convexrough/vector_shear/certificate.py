@@ -172,12 +172,11 @@ def _shift(problem: FrictionProblem, eta: Array, turned: Array, missing: float) 
 def _excess(problem: FrictionProblem, state: VectorState, total: Ball, errors: Array) -> float:
     """Bound on E(q) - E(q*) for the energy E; infinite if X is, or if E is not proved convex.
 
-    It is the sum of e_i |q_i - q*_i|, plus a term for the error of the total and, for the rounding
-    of |q_i| = P_i, the sum of slip times P_i - |q_i|. It holds if |q_i| <= P_i up to rounding. e_i
-    is the distance of X - (B q)_i from the deflection of q_i or, where |q_i| = P_i, from the ray of
-    all eta with this force.
-
-    errors : (n,) bounds on |q - q*|
+    It is the sum of e_i |q_i - q*_i|, for `errors` (n,) that bound |q - q*|, plus a term for the
+    error of the total and, for the rounding of |q_i| = P_i, the sum of slip times P_i - |q_i|; it
+    also holds for forces q converted to the scene's units. It holds if |q_i| <= P_i up to rounding.
+    e_i is the distance of X - (B q)_i from the deflection of q_i or, where |q_i| = P_i, from the
+    ray of all eta with this force.
     """
     q, X = state.increments, state.displacement
     if not np.isfinite(X).all() or problem.margin == 0.0:
@@ -195,7 +194,9 @@ def _excess(problem: FrictionProblem, state: VectorState, total: Ball, errors: A
     moved = np.fmin(errors, length + problem.most)
     lacking = np.abs(problem.loads - length) + 4 * ROUNDOFF * problem.loads
     short = (Ball.exact(np.ascontiguousarray(q.T)).sum() - total) * X
-    return float(off @ moved + (nearest - own) @ lacking + short.size.sum()) * (1 + SAFETY)
+    converted = 4 * ROUNDOFF * (size @ np.hypot(*(along(own, q, length) + X - eta).T))
+    wrong = off @ moved + (nearest - own) @ lacking + short.size.sum() + converted
+    return float(wrong) * (1 + SAFETY)
 
 
 def _by_exhaustion(problem: FrictionProblem, state: VectorState, total: Ball) -> VectorBounds:
