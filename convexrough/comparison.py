@@ -66,10 +66,6 @@ class Entry(Record):
 
     The reference is Newton's method. If it or this solver has no solution, `disagreement` is nan,
     and the two numbers of asperities are None.
-
-    >>> reference, found = cr.compare(scene, approach=5e-5, solvers=["conic"]).entries
-    >>> found.outcome, found.disagreement < 1e-9, found.different_statuses
-    ('answered', True, 0)
     """
 
     solver: str

@@ -147,10 +147,6 @@ class Cycles(Table):
     """The steady cycles of m contacts. Arrays are (m,), `status` is (m, n); `Cycle` explains them.
 
     `cycles[k]` is the `Cycle` of contact k.
-
-    >>> cycles = cr.press_many([scene, scene], load=3.6e-7).cycles([9e-8, 4e-8])
-    >>> print([f"{loss:.3g}" for loss in cycles.losses], cycles[0].loss == cycles.losses[0])
-    ['1.36e-13', '6.54e-15'] True
     """
 
     _along: ClassVar[Along] = {

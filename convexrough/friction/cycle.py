@@ -242,10 +242,6 @@ class Loop(Table):
     asperity_displacements : (m, k) [length] for each of these asperities, the displacement that its
         own shear force causes, plus its drift (its slip, while it touches): docs/theory/paths.md;
         0 where open
-
-    >>> loop = cr.cycle(contact, maximum=0.25 * contact.load).loop(points=100)
-    >>> len(loop.forces), loop.asperity_forces.shape
-    (101, (101, 61))
     """
 
     _shown = ("area",)

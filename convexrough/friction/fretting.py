@@ -50,10 +50,6 @@ class Fretting(Table, Plottable):
 
     If general steps give the results of the cycle (see `Cycle.order`), `loss_errors` is infinite,
     and all other arrays except the status are nan.
-
-    >>> worn = cr.fretting(cr.cycle(contact, maximum=0.25 * contact.load))
-    >>> print(f"{worn.slip_amplitudes.max():.3g}", worn.losses.argmax())
-    3.21e-06 31
     """
 
     _along: ClassVar[Along] = {

@@ -64,10 +64,6 @@ class LoadPath(Table, Plottable):
         highest load of all normal solutions used; other values as in `Cycle`
     presses        : number of normal problems that were solved
     start          : [force] load of the contact at the start; 0 if the bodies are separate
-
-    >>> path = cr.load_path(scene, loads=[contact.load], forces=[0.1 * contact.load])
-    >>> path.order, path.status.shape, path.presses
-    ('proved', (1, 61), 2)
     """
 
     _along: ClassVar[Along] = {

@@ -88,13 +88,6 @@ class PhaseLosses(Table, Plottable):
     levels  : (c,) [force] `Cycle.level`, the load L* up to which the memory curve no longer changes
     sliding : (c,) number of asperities that slide as a whole or lose contact in the steady cycle
     order   : the weakest `Cycle.order` of all cycles
-
-    >>> losses = cr.phase_losses(
-    ...     scene, load=contact.load, load_amplitude=0.3 * contact.load,
-    ...     force_amplitude=0.14 * contact.load, phases=[0.0, np.pi / 2], chords=8
-    ... )
-    >>> losses.losses.shape, losses.sliding.tolist()
-    ((2,), [12, 6])
     """
 
     _along: ClassVar[Along] = {

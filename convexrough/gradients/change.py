@@ -39,9 +39,6 @@ class Direction(Record):
     load, approach : [force], [length] give at most one. Without either, the quantity that was
         prescribed for the contact is kept constant
     friction, force : coefficient of friction and shear force [force]; only for friction states
-
-    >>> contact.change(cr.Direction(heights=1e-9)).load > 0
-    True
     """
 
     heights: ArrayLike = 0.0

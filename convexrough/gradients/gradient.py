@@ -190,10 +190,6 @@ class Gradient(Table, Plottable):
     force_sides, load_sides : (m, 2) the derivatives by `forces` and `loads` from below and above
     balance_defect  : difference between two formulas for the derivative by the modulus, divided by
         the largest term of both formulas; a check of rounding
-
-    >>> gradient = cr.cycle(contact, maximum=0.25 * contact.load).gradient(holding="load")
-    >>> print(f"{gradient.heights[0]:.4g}", f"{gradient.maximum:.4g}")
-    5.907e-10 2.717e-06
     """
 
     _along: ClassVar[Along] = {

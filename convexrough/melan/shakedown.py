@@ -58,11 +58,6 @@ class Shakedown(Table, Plottable):
     order   : for "exact" as `Cycle.order`; bounds are proved only if it is "proved". Else None
     load, force : [force] P0 and Q0; Q0 is (2,) for "vector"
     load_amplitudes, force_amplitudes : (m,) [force] p and q; q is (m, 2) for "vector"
-
-    >>> Q = 0.1 * contact.load
-    >>> limit = cr.shakedown(scene, load=contact.load, force_amplitudes=[Q, -Q])
-    >>> limit.lower <= limit.factor <= limit.upper
-    True
     """
 
     _along: ClassVar[Along] = {

@@ -99,10 +99,6 @@ class FrictionConic:
         """The state under a total (2,), |T| < sum P, in scaled units.
 
         Raises SolverError if the program is not convex or the result exceeds `accepted`.
-
-        >>> problem = contact.cached(FrictionProblem)
-        >>> cr.FrictionConic().solve(problem, np.array([0.1, 0.0])).increments.shape
-        (37, 2)
         """
         solver, size = f"friction ({self.name})", float(np.hypot(*total))
         if problem.share > FIVE_CONES_LIMIT:
