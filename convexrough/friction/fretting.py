@@ -1,7 +1,4 @@
-"""Fretting: slip, energy loss and shear traction of each asperity in a steady cycle.
-
-docs/theory/losses.md, "Slip and traction inside a contact", gives the formulas.
-"""
+"""Fretting: slip, energy loss and shear traction of each asperity in a steady cycle."""
 
 from __future__ import annotations
 

@@ -211,10 +211,7 @@ def walk_of(
     steps: int | None = None,
     stepper: type[Stepper] = Stepper,
 ) -> tuple[Contact, Walk]:
-    """The contact at the highest load of a path, and the path; arguments as in `load_path`.
-
-    If all loads are 0, the contact is at the first touch.
-    """
+    """The contact at the highest load of a path, and the path; arguments as in `load_path`."""
     checks.instance("scene", scene, Scene)
     f = checks.friction(scene.friction)
     P, Q = checks.array("loads", loads, sign="not negative"), checks.array("forces", forces)
@@ -238,7 +235,7 @@ def walk_of(
             expected = f"0, or at least {LEAST_PART:g} of the largest load, {max(positive):g}"
             raise InputError("loads", found=min(positive), expected=expected)
         contact = press(scene, load=max(positive), influence=influence)
-    else:
+    else:  # at the first touch
         contact = press(scene, approach=-float(scene.offsets.max()))
     return contact, Walk(contact.cached(FrictionLevels), curve, points, steps, stepper)
 

@@ -117,10 +117,8 @@ class Along:
 
     @cached_property
     def sums(self) -> tuple[Sums, Sums]:
-        """Weights at each level, in the sum of losses and in the sum of displacements.
-
-        The sums are divided by c_t f^2 and by c_t f, with c_t = tangential / normal compliance.
-        """
+        """Weights in the sums of losses over c_t f^2, and of displacements over c_t f (Mindlin's
+        ratio c_t)."""
         lost, moved = Sums(), Sums()
         for step, curve, pieces in zip(self.steps, self.walk.curves, self.walk.pieces, strict=True):
             _, loss, displacement = step
@@ -134,10 +132,7 @@ class Along:
         return lost, moved
 
     def parts(self, moves: Moves) -> tuple[list[Part], list[Part]]:
-        """The parts of the weighted sum of losses, and those of the sum of displacements.
-
-        moves : derivatives of the total load of every level with respect to parameters, at fixed T
-        """
+        """The parts of the weighted sums of losses and of displacements, if every level `moves`."""
         (lost, moved), at, force = self.sums, self.known.at, self.known.units.force
         unit, travel = self.known.loss_unit, self.known.travel_unit
         return [
@@ -150,10 +145,7 @@ class Along:
 
     @cached_property
     def nearly_tied(self) -> bool:
-        """True if two unequal values of P, of P + T or of P - T differ by less than ROUNDED.
-
-        The values are those at the vertices of all memory curves along the path.
-        """
+        """True if P, P + T or P - T at any vertices along the path nearly agree, up to ROUNDED."""
         vertices = {
             vertex for it in self.walk.curves for vertex in zip(it.levels, it.heights, strict=True)
         }

@@ -113,10 +113,7 @@ class ShearChange(Table):
 
 
 def contact_change(contact: Contact, direction: Direction) -> ContactChange:
-    """The result of `Contact.change`.
-
-    Raises InputError for a change of friction or shear force, or of both load and approach.
-    """
+    """The result of `Contact.change`."""
     checks.instance("direction", direction, Direction)
     for name in ("friction", "force"):
         if (given := getattr(direction, name)) != 0.0:
@@ -172,10 +169,7 @@ def _gap_changes(contact: Contact, bent: _Bent, loads: Array, approach: float) -
 
 
 def shear_change(state: ShearState, direction: Direction) -> ShearChange:
-    """The result of `ShearState.change`, from the changes at the loads P and P - Q / f.
-
-    Raises InputError in gross sliding.
-    """
+    """The result of `ShearState.change`, from the changes at the loads P and P - Q / f."""
     contact, known = state.contact, with_friction(state)
     checks.instance("direction", direction, Direction)
     if abs(state.height) == known.load:

@@ -32,8 +32,8 @@ def solve(contact: Contact, mean: Array, vertices: Array) -> dict[str, Any]:
     unit, n, m = known.units.force, len(known), len(vertices)
     checks.fits_in_memory("cones", m * n, 4000.0)
     shares, share_errors = elastic_shares(known)
-    elastic = np.einsum("ijk,vk->vij", shares, vertices / unit)  # (m, n, 2)
-    errors = np.einsum("ik,vk->vi", share_errors, np.abs(vertices) / unit)
+    elastic = np.einsum("ijk,vk->vij", shares, vertices / unit)  # (m, n, 2) forces at t_v
+    errors = np.einsum("ik,vk->vi", share_errors, np.abs(vertices) / unit)  # (m, n) of `elastic`
     mean, steady, P = mean / unit, shares @ (mean / unit), known.loads
     raw = run_clarabel(_program(P, steady, elastic), "shakedown", TOLERANCE)
     # The residual forces, corrected to the sum t0, and moved away from the friction limits.
@@ -115,10 +115,7 @@ def _program(limits: Array, steady: Array, elastic: Array) -> ConeProgram:
 def _lower(
     known: FrictionProblem, rest: Array, mean: Array, elastic: Array, errors: Array
 ) -> float:
-    """A lower bound on the largest lambda, from residual forces `rest`; 0 without a proof.
-
-    elastic, errors : (m, n, 2) elastic forces at t_v, and (m, n) bounds on their errors
-    """
+    """A lower bound on the largest lambda, from residual forces `rest`; 0 without a proof."""
     missing = float(np.hypot(*(rest.sum(axis=0) - mean)))
     missing += 4 * len(rest) * ROUNDOFF * float(np.abs(rest).sum())
     limits, most = (known.loads - known.errors - missing) * (1 - SAFETY), 0.0

@@ -133,12 +133,8 @@ def _steepest(problem: FrictionProblem, size: Array) -> Array:
 
 
 def _shift(problem: FrictionProblem, eta: Array, turned: Array, missing: float) -> float:
-    """The r of step 2: some vector of at most this length, added to all eta, restores the total.
-
-    It is infinite if no r is found.
-
-    turned  : (n,) each eta_i may also change by a vector of up to this length
-    missing : bound on the difference of the sum of the forces from the total
+    """The r of step 2: some vector of at most this length, added to all eta, restores the total, of
+    which `missing` is missing, if each eta_i also changes by up to `turned` (n,). inf if not found.
     """
     size = np.hypot(*eta.T)
     if not np.isfinite(turned).all() or not missing < np.inf:

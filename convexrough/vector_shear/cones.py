@@ -142,11 +142,9 @@ def _too_dense(problem: FrictionProblem) -> SolverError:
 def _program(problem: FrictionProblem, total: Array, small: Array) -> tuple[ConeProgram, float]:
     """The cone program for a total (2,), with numbers of about 1, and its unit of energy.
 
-    The variables are q / (epsilon P), in the order x_1, y_1, x_2, ..., then those of the cones,
-    asperity by asperity; those of order k in u are divided by epsilon^k. Of the rows of the cones,
-    the first three of each asperity are m / P >= |q| / P, divided by epsilon.
-
-    small : (n,) epsilon
+    With epsilon = `small` (n,), the variables are q / (epsilon P), in the order x_1, y_1, x_2, ...,
+    then those of the cones, asperity by asperity; those of order k in u are divided by epsilon^k.
+    Of the rows of the cones, the first three of each asperity are m / P >= |q| / P, over epsilon.
     """
     from scipy import sparse  # 0.1 s to import: only when solving
 

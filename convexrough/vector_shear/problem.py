@@ -138,10 +138,7 @@ class FrictionProblem:
         return self.levels.top.tangent.loads[self.places]
 
     def from_rest(self, height: Fraction) -> tuple[Array, Array]:
-        """(n,) scaled shear forces u, and sums eta of deflection and slip, in the model of `shear`.
-
-        height : [force] T = Q / f
-        """
+        """(n,) forces u, and sums eta of deflection and slip, from `shear` at T [force]."""
         if height < ELASTIC * self.levels.load:
             shares = self.elastic.value * float(height / Fraction(self.units.force))
             return shares, shares * self.compliance
@@ -248,10 +245,7 @@ def slopes(scale: Array, share: Array) -> tuple[Array, Array]:
 
 
 def along(lengths: Array, vectors: Array, sizes: Array) -> Array:
-    """(n, 2) vectors of the given lengths in the directions of `vectors`; 0 where these are 0.
-
-    sizes : (n,) the lengths of `vectors`
-    """
+    """(n, 2) vectors of these lengths along `vectors`, which have the lengths `sizes`, or are 0."""
     scale: Array = lengths / np.where(sizes > 0, sizes, 1.0)
     return vectors * scale[:, None]
 
