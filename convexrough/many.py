@@ -40,12 +40,6 @@ class Contacts(Table):
     load_errors, approach_errors : (m,) bounds on the errors of `loads` and `approaches`
     asperity_loads, asperity_load_errors : (m, n) [force] loads, and bounds on their errors
     status   : (m, n) "contact" or "open" where that is proved, else "undecided"
-
-    >>> contacts = cr.press_many([scene, scene], approach=[5e-5, 1e-5])
-    >>> contacts.asperity_loads.shape, (contacts.status == "contact").sum(axis=1).tolist()
-    ((2, 61), [37, 7])
-    >>> bool(contacts[0].load == contacts.loads[0])
-    True
     """
 
     _along: ClassVar[Along] = {
@@ -98,6 +92,7 @@ class Contacts(Table):
         limits = np.array(f) * self.loads
         upper, lower = force_ranges(maximum, minimum, limits, length=m, one="scene")
         fields: dict[str, NDArray[Any]] = {name: np.zeros(m) for name in CYCLE}
+        fields |= {"maximum": upper.copy(), "minimum": lower.copy()}
         fields["order"] = np.full(m, "proved", dtype="<U19")
         fields["status"], alone = np.full((m, n), "open", dtype="<U12"), np.ones(m, dtype=bool)
         with threads.one_where(MATRICES):
@@ -108,14 +103,11 @@ class Contacts(Table):
                 alone[places] = False
                 for name, values in found.items():
                     fields[name][places] = values[good]
-        upper, lower = upper.copy(), lower.copy()
         for k in np.flatnonzero(alone).tolist():
             one = cycle(self[k], maximum=float(upper[k]), minimum=float(lower[k]))
-            upper[k], lower[k] = one.maximum, one.minimum
             for name, values in fields.items():
                 values[k] = getattr(one, singular(name))
-        fields = {name: frozen(values) for name, values in fields.items()}
-        return Cycles(contacts=self, maximum=frozen(upper), minimum=frozen(lower), **fields)
+        return Cycles(contacts=self, **{name: frozen(values) for name, values in fields.items()})
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:

@@ -72,9 +72,6 @@ class ContactChange(Table):
     gaps     : (n,) [length] gaps, in the scene's order
     approach : [length] approach
     load     : [force] total load
-
-    >>> print(f"{contact.change(cr.Direction(load=1e-9)).approach:.4g}")
-    8.234e-08
     """
 
     _along: ClassVar[Along] = {("asperity",): ("loads", "gaps")}
@@ -96,10 +93,6 @@ class ShearChange(Table):
     forces  : (n,) [force] shear forces, in the scene's order
     slips   : (n,) [length] gross slips, in the scene's order
     displacement : [length] tangential displacement of one body relative to the other
-
-    >>> state = cr.shear(contact, force=0.25 * contact.load)
-    >>> print(f"{state.change(cr.Direction(force=1e-9)).displacement:.4g}")
-    1.246e-07
     """
 
     _along: ClassVar[Along] = {("asperity",): ("forces", "slips")}
