@@ -47,7 +47,9 @@ class Shakedown(Table, Plottable):
         stick until they slide as a whole, by Melan's theorem at constant load. "elastic" uses the
         scalar tangential kernel, "vector" the full one, with shear forces in the plane
     factor  : the largest factor, at most `gross`, at which after some cycles no asperity that
-        touches at P0 slides as a whole or opens; `limited_by` says which happens at larger factors
+        touches at P0 slides as a whole or opens
+    limited_by : what happens in every cycle at larger factors: "sliding" of asperities as a whole,
+        or "opening"; None if the factor is infinite
     lower, upper : proved bounds on `factor`; 0 and infinite without a proof
     factors : (n,) the same limit for each asperity alone; nan if it is not computed or the asperity
         does not touch at P0; for "vector" all are equal
@@ -79,26 +81,12 @@ class Shakedown(Table, Plottable):
     load_amplitudes: Array
     force_amplitudes: Array
     order: Order | None = None
+    limited_by: Literal["sliding", "opening"] | None = "sliding"
 
     @property
     def gap(self) -> float:
         """(upper - lower) / factor; 0 if the factor is infinite."""
         return (self.upper - self.lower) / self.factor if np.isfinite(self.factor) else 0.0
-
-    @property
-    def limited_by(self) -> Literal["sliding", "opening"] | None:
-        """What critical asperities do above `factor`: slide as a whole, or open in every cycle."""
-        if self.factor == np.inf:
-            return None
-        if not self.load_amplitudes.any():
-            return "sliding"
-        p, t = self.load_amplitudes, self.force_amplitudes / checks.friction(self.scene.friction)
-        if self.factor == self.gross:  # where P - |T| is 0, sliding as a whole needs a force
-            heights = np.abs(self.force / checks.friction(self.scene.friction) + self.factor * t)
-            critical = int(np.argmin(self.load + self.factor * p - heights))
-            return "sliding" if heights[critical] > SAFETY * self.load else "opening"
-        fall, opens = _fall(p, t), float((-p).max())
-        return "opening" if fall <= opens * (1 + SAFETY) else "sliding"
 
     @property
     def proved(self) -> bool:
@@ -205,7 +193,7 @@ def _exact(contact: Contact, t0: Fraction, p: Any, t: Any) -> dict[str, Any]:
     levels = contact.cached(FrictionLevels)
     P0 = levels.load
     plus, minus = (-(p + t)).max(), (-(p - t)).max()
-    fall = _fall(p, t)
+    fall = (plus + minus) / 2  # of the load L* per unit of the factor
     gross = min((P0 + c * t0) / r if r > 0 else np.inf for c, r in ((1, plus), (-1, minus)))
     touching = np.flatnonzero(contact.loads)
     last, worst = last_to_touch(levels)
@@ -220,6 +208,10 @@ def _exact(contact: Contact, t0: Fraction, p: Any, t: Any) -> dict[str, Any]:
     factors = np.full(len(contact.scene), np.nan)
     for asperity, onset in found.items():
         factors[asperity] = factor(onset.load)
+    limit, opens = float(factors[last]), fall <= max(-p) * (1 + SAFETY)
+    if limit == float(gross) < np.inf:  # where P - |T| is 0, sliding as a whole needs a force
+        heights = abs(t0 + Fraction(limit) * t)
+        opens = heights[np.argmin(P0 + Fraction(limit) * p - heights)] <= SAFETY * P0
     sure, top = levels.at(worst.upper), levels.top
     lower, upper = factor(worst.upper), factor(worst.lower)
     highest = float(P0) + float(max(p)) * upper * (1 + SAFETY) if max(p) > 0 else 0.0
@@ -233,7 +225,8 @@ def _exact(contact: Contact, t0: Fraction, p: Any, t: Any) -> dict[str, Any]:
     height = min(max(t0 - part * (plus - minus) / 2, -at_last), at_last)
     rest = levels.to_scene(levels.at(at_last).loads.value * levels.units.force)
     return {
-        "factor": float(factors[last]),
+        "factor": limit,
+        "limited_by": None if limit == np.inf else "opening" if opens else "sliding",
         "lower": lower * (1 - SAFETY) if proved else 0.0,
         "upper": upper * (1 + SAFETY) if proved else np.inf,
         "factors": factors,
@@ -255,11 +248,6 @@ def _order(contact: Contact, onset: Onset, highest: float) -> Order:
         except (InputError, SolverError):  # also for loads beyond the range of numbers
             return "fails"
     return levels.order({onset.lower, onset.upper})
-
-
-def _fall(p: Any, t: Any) -> Any:
-    """The decrease of the load L* of `_exact` per unit of the factor, with t = q / f."""
-    return ((-(p + t)).max() + (-(p - t)).max()) / 2
 
 
 def _elastic(contact: Contact, t0: Fraction, t: Any) -> dict[str, Any]:
