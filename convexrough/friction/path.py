@@ -1,11 +1,8 @@
-"""Friction states along a path of load P and shear force Q: `load_path`; at constant P: `history`.
-
-With the coefficient of friction f, `walk.Walk` follows the points (P, T), where T = Q / f.
-"""
+"""`load_path`: friction states along a path of load and shear force; `history`: at one load."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, ClassVar, Literal
 
@@ -134,7 +131,7 @@ class LoadPath(Table, Plottable):
         """
         from convexrough.gradients.results import path_gradient  # a higher layer
 
-        return path_gradient(self, losses=losses, displacements=displacements, holding=holding)
+        return path_gradient(self, holding, losses=losses, displacements=displacements)
 
 
 def load_path(
@@ -175,8 +172,8 @@ def load_path(
         general_steps = checks.whole("general_steps", general_steps)
     if not isinstance(solver, str) or solver not in STEPPERS:
         raise InputError("solver", found=repr(solver), expected=f"one of {', '.join(STEPPERS)}")
-    stepper = STEPPERS[solver]
-    return path_of(*walk_of(scene, loads, forces, start, influence, general_steps, stepper))
+    contact, walk = walk_of(scene, loads, forces, start, influence)
+    return path_of(contact, replace(walk, steps=general_steps, stepper=STEPPERS[solver]))
 
 
 def history(contact: Contact, *, forces: ArrayLike) -> LoadPath:
@@ -203,13 +200,7 @@ def history(contact: Contact, *, forces: ArrayLike) -> LoadPath:
 
 
 def walk_of(
-    scene: Scene,
-    loads: ArrayLike,
-    forces: ArrayLike,
-    start: Contact | None = None,
-    influence: Kind | None = None,
-    steps: int | None = None,
-    stepper: type[Stepper] = Stepper,
+    scene: Scene, loads: ArrayLike, forces: ArrayLike, start: Contact | None, influence: Kind | None
 ) -> tuple[Contact, Walk]:
     """The contact at the highest load of a path, and the path; arguments as in `load_path`."""
     checks.instance("scene", scene, Scene)
@@ -237,7 +228,7 @@ def walk_of(
         contact = press(scene, load=max(positive), influence=influence)
     else:  # at the first touch
         contact = press(scene, approach=-float(scene.offsets.max()))
-    return contact, Walk(contact.cached(FrictionLevels), curve, points, steps, stepper)
+    return contact, Walk(contact.cached(FrictionLevels), curve, points)
 
 
 def path_of(contact: Contact, walk: Walk) -> LoadPath:

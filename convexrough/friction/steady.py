@@ -145,7 +145,7 @@ def steady(
     >>> f"{settled.level / P:.4f}", int((settled.status == "sliding").sum())
     ('0.3500', 12)
     """
-    contact, walk = walk_of(scene, loads, forces, influence=influence)
+    contact, walk = walk_of(scene, loads, forces, None, influence)
     return steady_cycles(contact, walk.start, [walk.points])[0]
 
 

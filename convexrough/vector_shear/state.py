@@ -145,7 +145,7 @@ def shear_vector(
         disagreement=_disagreement(forces, contact, Q),
         residual=problem.residual(state),
         duality_gap=known.excess * unit * travel,
-        certificate=_certificate(contact, problem, state, known, force_error),
+        certificate=_certificate(contact, state, known, force_error),
         solver=solver.name,
         iterations=state.iterations,
     )
@@ -210,12 +210,10 @@ def _disagreement(forces: Array, contact: Contact, Q: Array) -> float:
 
 
 def _certificate(
-    contact: Contact,
-    problem: FrictionProblem,
-    state: VectorState,
-    bounds: VectorBounds,
-    force_error: float,
+    contact: Contact, state: VectorState, bounds: VectorBounds, force_error: float
 ) -> ShearCertificate:
+    problem = contact.cached(FrictionProblem)
+
     def in_scene(errors: Array, values: Array, unit: float) -> Array:
         size = np.where(np.isfinite(values).all(axis=-1), np.hypot(*values.T), 0.0)
         return problem.to_scene((errors * (1 + SAFETY) + ROUNDED * size) * unit)
