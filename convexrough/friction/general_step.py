@@ -297,18 +297,14 @@ class SteppedPath(NamedTuple):
 
 
 def followed(
-    levels: FrictionLevels,
-    start: MemoryCurve,
-    points: Sequence[Point],
-    steps: int | None = None,
-    stepper: type[Stepper] = Stepper,
+    by: Stepper, start: MemoryCurve, points: Sequence[Point], steps: int | None = None
 ) -> SteppedPath:
     """The results of general steps along a path, with `steps` steps per segment.
 
     With None, the number n of steps is doubled until losses and displacements settle. The error of
     the loss W_n is about e / n^2 with some constant e, so the loss is then (4 W_2n - W_n) / 3.
     """
-    by, f = stepper(levels), float(levels.coefficient.value)
+    levels, f = by.levels, float(by.levels.coefficient.value)
     travel = float((levels.coefficient * levels.ratio).value)
 
     def found(count: int) -> SteppedPath:

@@ -94,7 +94,7 @@ class Walk:
         """
         if self.steps is None and (self.order != "fails" or not self.levels.proved):
             return None
-        return followed(self.levels, self.start, self.points, self.steps, self.stepper)
+        return followed(self.stepper(self.levels), self.start, self.points, self.steps)
 
     def states(self, which: Indices | slice = slice(None)) -> States:
         """The states at the m points, for the candidates `which`, by default all."""
@@ -158,7 +158,7 @@ class Closed(Walk):
             return None
         points, found = list(self.points[: self.once]), None
         for count in CYCLES:
-            found = followed(self.levels, self.start, [*points * count, points[0]])
+            found = followed(self.stepper(self.levels), self.start, [*points * count, points[0]])
             losses = self.losses_of(found)
             if np.isnan(losses[-2:]).any() or self.settled(losses):
                 break
