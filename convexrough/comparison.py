@@ -288,10 +288,6 @@ class Answer(NamedTuple):
     loads: Array
     certificate: Certificate
 
-    @classmethod
-    def of(cls, contact: Contact) -> Answer:
-        return cls(contact.solver, contact.loads, contact.certificate)
-
 
 def contradictions(first: Answer, second: Answer) -> list[str]:
     """A sentence for each kind of contradiction between two results.
@@ -299,12 +295,6 @@ def contradictions(first: Answer, second: Answer) -> list[str]:
     Two results contradict each other if loads, gaps or approaches differ by more than the sum of
     their error bounds, or if an asperity is proved to touch by one and to be open by the other. A
     result of scope "none" contradicts no other.
-
-    >>> from convexrough.comparison import Answer, contradictions
-    >>> one = Answer.of(contact)
-    >>> other = one._replace(name="another", loads=1.1 * contact.loads)
-    >>> [line.partition(" of ")[0] for line in contradictions(one, other)]
-    ['newton and another: loads']
     """
     one, other = first.certificate, second.certificate
     if "none" in (one.scope, other.scope):
