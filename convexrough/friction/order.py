@@ -33,7 +33,7 @@ from convexrough.roundoff import ROUNDOFF, SAFETY
 #: "proved": order holds at all loads between the levels in use. "proved for one step": no load P_i
 #: falls from a level in use to the next higher one, and no rate at the tested levels is negative;
 #: each friction state solves one step of `general_step`. "fails": one of these conditions
-#: is not met.
+#: is not met. The strongest comes first.
 Order = Literal["proved", "proved for one step", "fails"]
 
 #: A computed rate below -RATE_ROUNDING counts as negative. Rates are solved for to the relative

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import ClassVar
+from typing import ClassVar, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,9 +22,6 @@ from convexrough.record import Along, Table
 from convexrough.scene.asperities import Asperities
 from convexrough.scene.scene import Scene
 from convexrough.sphere.smooth import smooth_reference
-
-#: The values of `Cycle.order`, the weakest first.
-UNSURE_FIRST: tuple[Order, ...] = ("fails", "proved for one step", "proved")
 
 
 def elliptic_path(
@@ -175,5 +172,5 @@ def phase_losses(
         smooth=frozen(np.array(smooth)),
         levels=frozen(np.array([each.level for each in rough])),
         sliding=frozen(np.array(sliding, dtype=np.int64)),
-        order=min((each.order for each in rough), key=UNSURE_FIRST.index, default="proved"),
+        order=max((each.order for each in rough), key=get_args(Order).index),  # the weakest
     )
