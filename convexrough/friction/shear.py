@@ -143,8 +143,7 @@ class ShearState(Table, Plottable):
         """
         from convexrough.gradients.results import state_gradient  # a higher layer
 
-        weights = {"displacement": displacement, "forces": forces, "slips": slips}
-        return state_gradient(self, holding, **weights)
+        return state_gradient(self, holding, displacement=displacement, forces=forces, slips=slips)
 
     def change(self, direction: Direction) -> ShearChange:
         """First-order changes of forces, slips and displacement when the scene changes.

@@ -155,7 +155,7 @@ def shakedown(
     t0, t = Q0 / f, q / f
     if kind != "vector":  # exactly, as the factor can depend on small differences
         t0, t, p = Fraction(Q0) / Fraction(f), fractions(q) / Fraction(f), fractions(p)
-    if float(np.hypot(*np.atleast_1d(t0)) if kind == "vector" else abs(t0)) >= P0:
+    if (np.hypot(*t0) if kind == "vector" else abs(t0)) >= P0:
         raise InputError("force", found=force, expected=f"less than f P = {f * P0:g} in size")
     if len(q) == 0 or not (np.ptp(p) > 0 or np.ptp(q, axis=0).any()):
         expected = "a path that moves: at least two points, such as [Q, -Q]"
