@@ -145,7 +145,7 @@ class Along:
 
     @cached_property
     def nearly_tied(self) -> bool:
-        """True if P, P + T or P - T at any vertices along the path nearly agree, up to ROUNDED."""
+        """True if unequal P, P + T or P - T of vertices along the path differ by under ROUNDED."""
         vertices = {
             vertex for it in self.walk.curves for vertex in zip(it.levels, it.heights, strict=True)
         }

@@ -133,9 +133,9 @@ def _steepest(problem: FrictionProblem, size: Array) -> Array:
 
 
 def _shift(problem: FrictionProblem, eta: Array, turned: Array, missing: float) -> float:
-    """The r of step 2: some vector of at most this length, added to all eta, restores the total, of
-    which `missing` is missing, if each eta_i also changes by up to `turned` (n,). inf if not found.
-    """
+    """The r of step 2, or infinity: some vector of at most this length, added to all eta, restores
+    the total, which the forces miss by at most `missing`. Each eta_i may also change by up to
+    `turned` (n,)."""
     size = np.hypot(*eta.T)
     if not np.isfinite(turned).all() or not missing < np.inf:
         return np.inf
