@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copyreg
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
@@ -26,11 +27,7 @@ class ConvexroughError(Exception):
 
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle the error with its message, unchanged."""
-        return _again, (type(self), self.args), self.__dict__
-
-
-def _again(kind: type[ConvexroughError], arguments: tuple[object, ...]) -> ConvexroughError:
-    return kind.__new__(kind, *arguments)
+        return copyreg.__newobj__, (type(self), *self.args), self.__dict__  # type: ignore[attr-defined]
 
 
 class InputError(ConvexroughError, ValueError):

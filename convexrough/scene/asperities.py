@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
-from functools import cached_property, lru_cache
-from typing import Any
+from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,8 +20,9 @@ from convexrough.scene.layout import HEXAGONAL, SQUARE, Layout
 #: standard deviations, so that only finitely many asperities of an unbounded array can touch.
 CUT_DEVIATIONS = 6.0
 
-#: The last lattices of at most about this many points are kept.
+#: The last layouts of at most about this many points are kept, with what they store.
 FEW = 300
+_kept_layout = lru_cache(maxsize=8)(Layout.of)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -43,6 +43,8 @@ class Asperities(Record):
     positions: Array
     tip_radii: Array
     heights: Array
+    #: The positions, with data that depend only on them.
+    layout: Layout = field(init=False, repr=False)
 
     def __init__(
         self, positions: ArrayLike, tip_radii: ArrayLike, heights: ArrayLike = 0.0
@@ -53,14 +55,13 @@ class Asperities(Record):
             tip_radii, heights = (
                 np.asarray(each) if hasattr(each, "iloc") else each for each in (tip_radii, heights)
             )
-        self._set(points, tip_radii, heights)
-        self.layout  # noqa: B018, refuses two asperities at one place
+        self._set(Layout(points), tip_radii, heights)
 
-    def _set(self, positions: Array, tip_radii: ArrayLike, heights: ArrayLike) -> None:
-        n, least = len(positions), checks.SMALLEST
+    def _set(self, layout: Layout, tip_radii: ArrayLike, heights: ArrayLike) -> None:
+        n, least = len(layout.points), checks.SMALLEST
         radii = checks.array("tip_radii", tip_radii, length=n, sign="positive", smallest=least)
         tall = checks.array("heights", heights, length=n, smallest=least)
-        self.__dict__.update(positions=positions, tip_radii=radii, heights=tall)
+        self.__dict__.update(positions=layout.points, tip_radii=radii, heights=tall, layout=layout)
 
     def with_tips(self, tip_radii: ArrayLike, heights: ArrayLike = 0.0) -> Asperities:
         """Asperities with other tips at the same positions; arguments as for `Asperities`.
@@ -105,20 +106,11 @@ class Asperities(Record):
     @staticmethod
     def _on(layout: Layout, tip_radii: ArrayLike, heights: ArrayLike) -> Asperities:
         asperities = object.__new__(Asperities)
-        asperities._set(layout.points, tip_radii, heights)
-        asperities.__dict__["layout"] = layout
+        asperities._set(layout, tip_radii, heights)
         return asperities
 
     def __len__(self) -> int:
         return len(self.positions)
-
-    def __getstate__(self) -> dict[str, Any]:
-        return super().__getstate__() | {"layout": self.layout}
-
-    @cached_property
-    def layout(self) -> Layout:
-        """The positions, with data that depend only on them."""
-        return Layout(self.positions)
 
     @property
     def lattice(self) -> Lattice | None:
@@ -200,12 +192,6 @@ class Asperities(Record):
         n = len(layout.points)
         radii = checks.array("tip_radius", tip_radius, length=n, sign="positive")
         return cls._on(layout, radii, 0.0)
-
-
-@lru_cache(maxsize=8)
-def _kept_layout(second: tuple[float, float], spacing: float, limit: float) -> Layout:
-    """`Layout.of`; scenes that are made anew on the last layouts use what these store."""
-    return Layout.of(second, spacing, limit)
 
 
 def largest_tip_radius(tip_radius: ArrayLike, tip_radius_cv: float) -> float:
