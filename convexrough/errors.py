@@ -72,22 +72,14 @@ def blamed_on(where: object, table: str = "", *, unless_known: bool = False) -> 
 
 
 class MistakesError(InputError):
-    """All mistakes of a file; the message has one line per mistake."""
+    """All mistakes of a scene file or a table; the message has one line per mistake."""
 
-    def __init__(self, path: str, mistakes: Sequence[str]) -> None:
-        super().__init__("mistakes", found=len(mistakes), expected="none", where=path)
+    def __init__(self, path: object, mistakes: Sequence[str]) -> None:
+        super().__init__("mistakes", found=len(mistakes), expected="none", where=str(path))
         self.mistakes = tuple(f"{path}: {mistake}" for mistake in mistakes)
 
     def __str__(self) -> str:
         return "\n".join(self.mistakes)
-
-
-class SceneFileError(MistakesError):
-    """All mistakes of a scene file."""
-
-
-class TableError(MistakesError):
-    """All mistakes of a file of numbers."""
 
 
 class FileError(ConvexroughError):

@@ -22,7 +22,7 @@ from scenes import MATERIAL, PAPER_APPROACH, paper
 
 import convexrough as cr
 from convexrough import compare, plots, solvers
-from convexrough.errors import ExtraError, SceneFileError
+from convexrough.errors import ExtraError, MistakesError
 from convexrough.plots.notebook import ShownAxes
 from convexrough.record import Record, singular
 
@@ -140,7 +140,7 @@ def test_errors_pass_between_processes() -> None:
     for error in (
         cr.InputError("load", found=-1, expected="a positive number", where="a.toml"),
         cr.SolverError("no step", solver="newton", advice="less load", iterate=np.ones(2)),
-        SceneFileError("a.toml", ["one", "two"]),
+        MistakesError("a.toml", ["one", "two"]),
         ExtraError("pandas"),
         cr.FileError("a.toml: missing"),
     ):

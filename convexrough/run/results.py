@@ -205,9 +205,7 @@ def remove_earlier(folder: Path) -> None:
 
 def _listed(folder: Path) -> list[str]:
     """The names of the files that `files.json` lists, without folders such as "../"; [] without it.
-
-    Raises FileError if `files.json` is damaged, because then the earlier files are unknown.
-    """
+    Raises FileError if `files.json` is damaged, because then the earlier files are unknown."""
     path = folder / MANIFEST
     if not path.exists():
         return []

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from convexrough import checks
 from convexrough.contact import Contact, assembled, solve
-from convexrough.errors import FileError, InputError, SceneFileError, blamed_on, file_errors
+from convexrough.errors import FileError, InputError, MistakesError, blamed_on, file_errors
 from convexrough.influence import Kind
 from convexrough.normal.load_control import all_that_could_touch
 from convexrough.normal.problem import NormalProblem
@@ -62,10 +62,8 @@ class Task(Record):
         return NormalProblem.assemble(self.scene, approach=self.approach, load=self.load, **how)
 
     def press(self) -> Contact:
-        """The contact under the prescribed approach or load, as found by `solver`.
-
-        Raises InputError and SolverError, as `press` does.
-        """
+        """The contact under the prescribed approach or load, as found by `solver`. Raises
+        InputError and SolverError, as `press` does."""
         given = self.approach, self.load, self.influence, self.highest_approach
         return solve(assembled(self.solver, self.scene, *given), self.solver)
 
@@ -126,7 +124,7 @@ def read_scene(path: str | os.PathLike[str], *, asperities: Asperities | None = 
     path : name of the file, in the format of docs/reference/scene-file.md
     asperities : asperities that replace those of the file, such as the summits of a map
 
-    Raises FileError if a file cannot be read or is not TOML, SceneFileError with every mistake in
+    Raises FileError if a file cannot be read or is not TOML, MistakesError with every mistake in
     the tables, and InputError for mistakes found when the scene is built.
 
     >>> file = cr.read_scene(new_scene)  # what `convexrough new` writes
@@ -158,13 +156,13 @@ def read_scene(path: str | os.PathLike[str], *, asperities: Asperities | None = 
 
 
 def read_study(path: Path) -> tuple[Study, str]:
-    """The checked tables of a scene file, and its text. Raises FileError and SceneFileError."""
+    """The checked tables of a scene file, and its text. Raises FileError and MistakesError."""
     from convexrough.run.study import validate
 
     text = read_text(path)
     study, mistakes = validate(tables_of(path, text))
     if study is None:
-        raise SceneFileError(str(path), few(mistakes, MOST_MISTAKES))
+        raise MistakesError(path, few(mistakes, MOST_MISTAKES))
     return study, text
 
 

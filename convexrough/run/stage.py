@@ -225,10 +225,8 @@ class Result(Record):
         return [*said, *aligned([keys, *cells], digits=self.digits)]
 
     def plot(self, axes: Axes | None = None, **options: Any) -> Axes:
-        """Draw the main figure of the last object in `found`, and return the axes.
-
-        Raises InputError if there is none, as where no gradient exists.
-        """
+        """Draw the main figure of the last object in `found`, and return the axes. Raises
+        InputError if there is none, as where no gradient exists."""
         checks.some(self.name, self.found)
         return cast("Axes", self.found[-1].plot(axes, **options))
 

@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import scipy
 
-from convexrough.errors import FileError, InputError, SceneFileError
+from convexrough.errors import FileError, InputError, MistakesError
 from convexrough.run.asperity_file import read_summits
 from convexrough.run.scene_file import Task, digest, regular, tasks_of
 from convexrough.run.stage import Columns as Columns
@@ -63,10 +63,8 @@ class Tables:
         return self
 
     def opened(self) -> Callable[[int], Task]:
-        """A function from numbers to scenes; consecutive scenes share common data.
-
-        Raises FileError if a file of asperities is not as it was when the sweep was planned.
-        """
+        """A function from numbers to scenes; consecutive scenes share common data. Raises FileError
+        if a file of asperities is not as it was when the sweep was planned."""
         for name, known in self.inputs.items():
             if digest(self.path.parent / name) != known:
                 raise FileError(f"{self.path.parent / name}: changed since the sweep began")
@@ -77,7 +75,7 @@ class Tables:
             values, seed = self.grid.point(number)
             study, mistakes = validate(with_values(self.tables, values, seed))
             if study is None:
-                raise SceneFileError(str(self.path), self.grid.blame(mistakes, seed))
+                raise MistakesError(self.path, self.grid.blame(mistakes, seed))
             return tasks_of(self.path, study, summits=summits, lattice=lattice)
 
         def task(number: int) -> Task:

@@ -60,10 +60,8 @@ class Folder:
         return self.path / PARTS / f"{first:012d}{self.ending}"
 
     def write(self, columns: Columns) -> None:
-        """Write the columns of a part. An interruption leaves no incomplete part.
-
-        Raises FileError if it cannot be written, or if another sweep replaced this one meanwhile.
-        """
+        """Write the columns of a part. An interruption leaves no incomplete part. Raises FileError
+        if it cannot be written, or if another sweep replaced this one meanwhile."""
         folder_of(self.path, self.manifest)
         pyarrow, parquet = arrow()
         whole = BytesIO()
@@ -96,10 +94,8 @@ class Folder:
         }
 
     def missing(self, wanted: list[range], resume: bool) -> tuple[list[range], str]:
-        """The parts of `wanted` that are not yet computed, and a message on what was found.
-
-        Their unfinished files are removed. Raises FileError if a part must not exist.
-        """
+        """The parts of `wanted` that are not yet computed, and a message on what was found. Their
+        unfinished files are removed. Raises FileError if a part must not exist."""
         known = {part.start for part in self.parts()}
         todo = [part for part in wanted if part.start not in known]
         count = sum(map(len, wanted))

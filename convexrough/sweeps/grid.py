@@ -158,10 +158,8 @@ class Grid(FileTable):
 
 
 def random_value(key: str, seed: int, law: Law, first: float, second: float) -> float:
-    """The random value of a key for a seed, independent of the values of other keys.
-
-    Normal values, and logarithms of lognormal values, are clipped at six standard deviations.
-    """
+    """The random value of a key for a seed, independent of the values of other keys. Normal values,
+    and logarithms of lognormal values, are clipped at six standard deviations."""
     random = np.random.default_rng([seed, zlib.crc32(key.encode())])
     if law == "uniform":
         return float(random.uniform(first, second))

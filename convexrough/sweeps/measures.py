@@ -112,9 +112,7 @@ def row_label(ends: Sequence[float]) -> str:
 
 def chosen(contact: Contact, stages: Stages, measures: Sequence[str]) -> tuple[Column, ...]:
     """The columns for each name in `measures`. A name stands for the first number that has it.
-
-    Stages are computed until all names are found. Raises InputError for a name of no number.
-    """
+    Stages are computed until all names are found. Raises InputError for a name of no number."""
     rows: dict[str, dict[str, None]] = {}  # in order, by the name of the number
 
     def number(name: str) -> str:

@@ -13,7 +13,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from convexrough import checks
-from convexrough.errors import InputError, MistakesError, SceneFileError, blamed_on
+from convexrough.errors import InputError, MistakesError, blamed_on
 from convexrough.run.scene_file import Task, digest, read_text, tables_of
 from convexrough.run.stage import Stage
 from convexrough.run.stages import CycleStage, NormalStage, ShearStage
@@ -57,7 +57,7 @@ def plan_of(
 
     measure : replaces the list of numbers in the file
 
-    Raises FileError, SceneFileError, InputError; and the last error if `TRIED` scenes all fail.
+    Raises FileError, MistakesError, InputError; and the last error if `TRIED` scenes all fail.
     """
     contents, text = what, ""
     if not isinstance(contents, Mapping):
@@ -68,7 +68,7 @@ def plan_of(
     table = contents.get("sweep")
     if table is None:
         known = ", ".join(Grid.model_fields)
-        raise SceneFileError(str(path), [f"[sweep]: missing table; its keys are: {known}"])
+        raise MistakesError(path, [f"[sweep]: missing table; its keys are: {known}"])
     if measure is not None and isinstance(table, dict):
         table = {**table, "measure": list(measure)}
     grid, mistakes = validate_table("sweep", table, Grid)
@@ -80,10 +80,10 @@ def plan_of(
         if "seeds" in table_in(contents, "sweep"):
             unknown.append("[asperities] seed: missing")
         rest = [each for each in others if not any(it in each for it in unknown)]
-        raise SceneFileError(str(path), [*mistakes, *random, *rest])
+        raise MistakesError(path, [*mistakes, *random, *rest])
     study, mistakes = _of_values(grid, tables)
     if study is None or mistakes or random:
-        raise SceneFileError(str(path), [*mistakes, *random])
+        raise MistakesError(path, [*mistakes, *random])
     own = [tables.get("asperities", {}).get("path")]
     files = {str(each) for each in grid.axes.get("asperities.path", own) if each is not None}
     inputs = {each: digest(path.parent / each) for each in sorted(files)}

@@ -121,8 +121,7 @@ def run(
     part: tuple[int, int] | None = None,
 ) -> tuple[SweepTable, dict[str, Any]]:
     """The table of a plan, with its missing rows computed; arguments as for `sweep`. And by name: a
-    message about rows that are `found`, the number of scenes that are `computed`, and `seconds`.
-    """
+    message about rows that are `found`, the number of scenes that are `computed`, and `seconds`."""
     began, folder, found = time.monotonic(), None, ""
     todo = _share(plan, part)
     if out is not None:
@@ -178,8 +177,7 @@ def _report_progress(found: Iterator[Columns], count: int) -> Iterator[Columns]:
 
 def computed(batches: Iterable[Batch], executor: Executor) -> Iterator[Columns]:
     """Yield the rows of batches, in order of completion; lost ones again at the end, one by one.
-    Raises WorkerError as `sweep` does.
-    """
+    Raises WorkerError as `sweep` does."""
     dead = []
     for batch in (yield from _together(iter(batches), executor)):
         dead += yield from _together(iter((batch,)), executor)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from convexrough import checks
 from convexrough.arrays import Array
-from convexrough.errors import InputError, TableError
+from convexrough.errors import InputError, MistakesError
 from convexrough.tabular import roles
 from convexrough.tabular.arrays import ARRAYS, read_arrays, reading
 from convexrough.tabular.roles import AS_IT_IS, COLUMNS, Reading, is_index, shortened
@@ -63,7 +63,7 @@ def read_table(
     how: Reading = AS_IT_IS,
     cells: Cells | None = None,
 ) -> ReadTable:
-    """Columns of a file by known names; TableError has every mistake of the file.
+    """Columns of a file by known names; MistakesError has every mistake of the file.
 
     required, optional : names of columns in `COLUMNS`
     instead : columns that replace the only required one if the file has the first of these, only
@@ -170,7 +170,7 @@ def _unnamed(
 
 
 def matrix(path: Path, cells: Cells) -> Array:
-    """The numbers of a table without a header; `HOLES` are nan. Raises TableError."""
+    """The numbers of a table without a header; `HOLES` are nan. Raises MistakesError."""
     columns, mistakes = cells.columns, list[str]()
     if cells.style.separator == "," and not any("." in row for row in cells.lines):
         whole, parts = ({*chain(*columns[i::2])} for i in (0, 1))
@@ -272,9 +272,9 @@ def _shown(mistake: str, line: str) -> str:
 
 
 def refuse(path: Path, mistakes: list[str]) -> None:
-    """Raise TableError with the first mistakes of a file, if there are any."""
+    """Raise MistakesError with the first mistakes of a file, if there are any."""
     if mistakes:
-        raise TableError(str(path), few(mistakes))
+        raise MistakesError(path, few(mistakes))
 
 
 def few(mistakes: list[str], most: int = MOST_MISTAKES) -> list[str]:

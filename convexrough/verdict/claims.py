@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.contact import Contact
-from convexrough.errors import InputError, SolverError, TableError, blamed_on
+from convexrough.errors import InputError, MistakesError, SolverError, blamed_on
 from convexrough.friction.verdict import claims_sliding, verify_shear
 from convexrough.normal.claims import Claim, tolerance
 from convexrough.normal.problem import NormalProblem
@@ -275,7 +275,7 @@ def _areas(path: Path, table: ReadTable, count: int) -> Any:
     except InputError as error:
         expected = f"a column 'area', or x and y on a regular grid: {error.what} {error.found}"
         mistake = f"columns: found pressure without areas, expected {expected}"
-        raise TableError(str(path), [mistake]) from error
+        raise MistakesError(path, [mistake]) from error
     return dx * dy * (1 if np.ptp((i + j) % 2) else 2)
 
 

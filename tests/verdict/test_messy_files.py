@@ -15,7 +15,7 @@ from scenes import MATERIAL, hexagonal
 from scipy.io import savemat
 
 import convexrough as cr
-from convexrough.errors import TableError
+from convexrough.errors import MistakesError
 from convexrough.run.study import UnitsTable
 from convexrough.verdict.claims import Manner, read_loads
 
@@ -322,7 +322,7 @@ def test_a_lattice_moved(tmp_path: Path, pattern: Any, moved: Any, cause: str) -
     scene = cr.Scene(1.0, asperities, MATERIAL)
     x, y = moved(asperities.positions).T
     name = put(tmp_path, {"x": x, "y": y, "load": np.ones(len(x))})
-    with pytest.raises(TableError, match=re.escape(f"{tmp_path / name}: positions: {cause}")):
+    with pytest.raises(MistakesError, match=re.escape(f"{tmp_path / name}: positions: {cause}")):
         read_loads(tmp_path / name, scene, Manner())
 
 
@@ -350,7 +350,7 @@ def test_headers_of_nodes_at_a_square_lattice(tmp_path: Path) -> None:
     scales, shifts = "--scale x=1000 --scale y=1000", "shifted by about [0.02, 0], "
     for moved, said in ((1e-3 * nodes, scales), (np.add(nodes, [0.02, 0]), shifts)):
         columns = {"x": moved[:, 0], "y": moved[:, 1], "load": shares}
-        with pytest.raises(TableError, match=re.escape(said)):
+        with pytest.raises(MistakesError, match=re.escape(said)):
             read_loads(tmp_path / put(tmp_path, columns), scene, Manner(nodes=True))
 
 
