@@ -6,7 +6,7 @@ Scenes whose solutions are not proved in this way are left out.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import partial
 from itertools import groupby
 from typing import Any, NamedTuple
@@ -104,29 +104,24 @@ def in_rows(scenes: Sequence[Scene], controls: Array, by_load: bool) -> list[Pre
     """
     if not scenes or len(scenes[0]) > MOST:
         return []
-    with threads.one_where(MATRICES):
-        return list(_in_rows(scenes, controls, by_load))
-
-
-def _in_rows(scenes: Sequence[Scene], controls: Array, by_load: bool) -> Iterator[PressedRows]:
     families: dict[tuple[Any, ...], list[int]] = {}
     for k, scene in enumerate(scenes):
         families.setdefault(_family(scene), []).append(k)
-    alike: dict[tuple[Any, ...], list[tuple[NormalProblem, list[int]]]] = {}
-    for places in families.values():
-        highest = [controls[k] + (0.0 if by_load else scenes[k].offsets.max()) for k in places]
-        first = places[int(np.argmax(highest))]
-        control = {"load" if by_load else "approach": float(controls[first])}
-        problem = NormalProblem.assemble(scenes[first], **control, influence="dense")
-        if len(problem):  # an asperity can touch; all become candidates
-            key = problem.units, *_family(problem.scene)[2:5]
-            problem = problem.widened(np.arange(len(problem.scene)))
-            alike.setdefault(key, []).append((problem, places))
+    alike: dict[tuple[Any, ...], list[tuple[NormalProblem, int]]] = {}
     some = max(1, min(MATRICES // len(scenes[0]) ** 2, NUMBERS // len(scenes[0])))
-    for group in alike.values():
-        every = [(problem, k) for problem, places in group for k in places]
-        for start in range(0, len(every), some):
-            yield from _proved(every[start : start + some], scenes, controls, by_load)
+    with threads.one_where(MATRICES):
+        for places in families.values():
+            highest = [controls[k] + (0.0 if by_load else scenes[k].offsets.max()) for k in places]
+            first = places[int(np.argmax(highest))]
+            control = {"load" if by_load else "approach": float(controls[first])}
+            problem = NormalProblem.assemble(scenes[first], **control, influence="dense")
+            if len(problem):  # an asperity can touch; all become candidates
+                key = problem.units, *_family(problem.scene)[2:5]
+                problem = problem.widened(np.arange(len(problem.scene)))
+                alike.setdefault(key, []).extend((problem, k) for k in places)
+        starts = ((each, k) for each in alike.values() for k in range(0, len(each), some))
+        found = [_proved(each[k : k + some], scenes, controls, by_load) for each, k in starts]
+    return [rows for rows in found if rows is not None]
 
 
 def _family(scene: Scene) -> tuple[Any, ...]:
@@ -142,8 +137,8 @@ def _proved(
     scenes: Sequence[Scene],
     controls: Array,
     by_load: bool,
-) -> Iterator[PressedRows]:
-    """Press the scenes of one stack, in the units of the first problem; yield what is proved."""
+) -> PressedRows | None:
+    """Press the scenes of one stack, in the units of the first problem; those that are proved."""
     first, places = every[0][0], np.array([k for _, k in every])
     n, units = len(first), first.units
     coupled, offsets, known = list[tuple[slice, NormalProblem]](), list[Ball](), list[Ball]()
@@ -164,9 +159,10 @@ def _proved(
     rows = Stack.of(coupled, exact, shelled, squares, given, by_load)
     level, proved = solved(rows)
     good = np.flatnonzero(proved)
-    if len(good) and level.box is not None:
-        some = rows.only(good), level.box.at(good), level.rows.at(good)
-        yield PressedRows(places[good], first, *some)
+    if not len(good) or level.box is None:
+        return None
+    some = rows.only(good), level.box.at(good), level.rows.at(good)
+    return PressedRows(places[good], first, *some)
 
 
 def _offsets(problem: NormalProblem, rows: Sequence[Scene]) -> Ball:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import ExitStack, suppress
+from contextlib import nullcontext, suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,13 +12,7 @@ import click
 
 from convexrough.atomic import write_text
 from convexrough.cli import common
-from convexrough.errors import (
-    FileError,
-    InputError,
-    ProofError,
-    blamed_on,
-    file_errors,
-)
+from convexrough.errors import FileError, InputError, ProofError, blamed_on, file_errors
 
 if TYPE_CHECKING:
     from convexrough.arrays import Array
@@ -113,7 +107,7 @@ def verify(
     from convexrough.run.scene_file import read_scene
     from convexrough.run.stages.normal import describe, judged_loads
     from convexrough.verdict import report
-    from convexrough.verdict.claims import judged, read_loads, read_shear_forces
+    from convexrough.verdict.claims import judged, read_forces
 
     if (shear is None) != (shear_force is None):
         raise click.UsageError("--shear and --shear-force go together.")
@@ -129,23 +123,22 @@ def verify(
             raise FileError(f"{each}: exists already; --force replaces it")
         with file_errors(each, "be written"):
             each.unlink(missing_ok=True)  # an earlier proof must not remain if this run fails
-    with ExitStack() as stack:
-        with common.progress(f"reading {scene}"):
-            file = read_scene(scene)
-        manner = _manner(units=file.scene.units, convert=file.convert, **how)
-        read = [read_loads(loads, file.scene, manner)]
-        read += [read_shear_forces(shear, file.scene, manner)] if shear is not None else []
-        if unread := manner.scales.keys() - {name for each in read for name in each.numbers}:
-            found = ", ".join(f"{name}={manner.scales[name]:.15g}" for name in sorted(unread))
-            known = ", ".join({name: "" for each in read for name in each.numbers})
-            raise InputError("--scale", found=found, expected=f"a column that is read: {known}")
-        about = report.describe_scene(file.scene)
-        if explain:
-            lines = [line for each in read for line in (f"{each.path}:", *each.explained, "")]
-            output.say({"read": [*lines, *about]}, [*lines, *about])
-            return common.DONE
-        inputs: list[str | Path] = [*file.inputs, *(each.path for each in read)]
-        new = stack.enter_context(output.folder(output.out, reads=inputs)) if output.out else None
+    with common.progress(f"reading {scene}"):
+        file = read_scene(scene)
+    manner = _manner(units=file.scene.units, convert=file.convert, **how)
+    files = {"load": loads, **({"force": shear} if shear is not None else {})}
+    read = [read_forces(path, file.scene, manner, name) for name, path in files.items()]
+    if unread := manner.scales.keys() - {name for each in read for name in each.numbers}:
+        found = ", ".join(f"{name}={manner.scales[name]:.15g}" for name in sorted(unread))
+        known = ", ".join({name: "" for each in read for name in each.numbers})
+        raise InputError("--scale", found=found, expected=f"a column that is read: {known}")
+    about = report.describe_scene(file.scene)
+    if explain:
+        lines = [line for each in read for line in (f"{each.path}:", *each.explained, "")]
+        output.say({"read": [*lines, *about]}, [*lines, *about])
+        return common.DONE
+    inputs = [*file.inputs, *files.values()]
+    with output.folder(output.out, reads=inputs) if output.out else nullcontext() as new:
         with common.progress(f"checking the loads of {len(file.scene):,} asperities"):
             with blamed_on(scene):
                 problem = file.problem()

@@ -85,17 +85,6 @@ class Claimed(NamedTuple):
     numbers: list[str]  # the known names of the columns of numbers that were read
 
 
-def read_loads(path: Path, scene: Scene, how: Manner) -> Claimed:
-    """Loads [force] from a file, of rows that are assigned to asperities by position, else by an
-    index, else in order; pressures at points are summed by asperity."""
-    return _read(path, scene, "load", how, how.floor)
-
-
-def read_shear_forces(path: Path, scene: Scene, how: Manner) -> Claimed:
-    """Shear forces [force] from the column `force` of a file, and its statuses, if any."""
-    return _read(path, scene, "force", how, np.inf)
-
-
 def judged(
     problem: NormalProblem,
     loads: Claimed,
@@ -137,7 +126,10 @@ def _claimed_to_slide(forces: Claimed, contact: Contact) -> NDArray[np.bool_] | 
     return np.where(said == "undecided", by_force, said == "sliding")
 
 
-def _read(path: Path, scene: Scene, name: str, how: Manner, floor: float) -> Claimed:
+def read_forces(path: Path, scene: Scene, how: Manner, name: str = "load") -> Claimed:
+    """Loads or shear forces [force] from the column "load" or "force" of a file. Its rows are
+    assigned to asperities by position, else by an index, else in order; nodes are summed."""
+    floor = how.floor if name == "load" else np.inf  # shear forces have any sign
     table = read_table(
         path,
         required=(name,),

@@ -17,7 +17,7 @@ from scipy.io import savemat
 import convexrough as cr
 from convexrough.errors import MistakesError
 from convexrough.run.study import UnitsTable
-from convexrough.verdict.claims import Manner, read_loads
+from convexrough.verdict.claims import Manner, read_forces
 
 COUNT = 12
 RNG = np.random.default_rng(5)
@@ -270,7 +270,7 @@ def test_pressures_at_hexagonal_points(tmp_path: Path) -> None:
     scene = hexagonal(spacing=1e-3, within=4e-3)
     x, y = scene.asperities.positions.T
     columns = {"x": x, "y": y, "pressure": np.full(len(x), 2.0)}
-    claimed = read_loads(tmp_path / put(tmp_path, columns), scene, Manner())
+    claimed = read_forces(tmp_path / put(tmp_path, columns), scene, Manner())
     np.testing.assert_allclose(claimed.values, 2.0 * 1e-6 * np.sqrt(0.75), rtol=1e-9)
     assert "each of area 8.6603e-07" in claimed.note
 
@@ -290,7 +290,7 @@ def test_pixels_of_a_large_disc_nearer_to_a_small_neighbour(tmp_path: Path, heig
     pressure = cr.fields.pressure(contact, np.column_stack((x, y)))
     pressure[np.hypot(x - 0.04, y) < contact.contact_radii[1]] = 0.0
     name = put(tmp_path, {"x": x, "y": y, "pressure": pressure})
-    loads = read_loads(tmp_path / name, scene, Manner()).values
+    loads = read_forces(tmp_path / name, scene, Manner()).values
     verdict = cr.verify(scene, loads, load=3.0, within=0.02)
     assert verdict.wrongly_open.tolist() == ([1] if contact.loads[1] > 0 else [])
     assert len(verdict.wrongly_loaded) == 0
@@ -303,7 +303,7 @@ def test_nodes_with_loads_in_a_wrong_unit(tmp_path: Path) -> None:
     loads = cr.press(scene, approach=2e-6).loads
     x, y = (scene.asperities.positions[:, None] + [[0.0, 0.0], [5e-5, 0.0]]).reshape(-1, 2).T
     columns = {"x": x, "y": y, "load": np.repeat(loads, 2) / 2 * 1e3}
-    claimed = read_loads(tmp_path / put(tmp_path, columns), scene, Manner(nodes=True))
+    claimed = read_forces(tmp_path / put(tmp_path, columns), scene, Manner(nodes=True))
     np.testing.assert_allclose(claimed.values, loads * 1e3, rtol=1e-6)
 
 
@@ -323,7 +323,7 @@ def test_a_lattice_moved(tmp_path: Path, pattern: Any, moved: Any, cause: str) -
     x, y = moved(asperities.positions).T
     name = put(tmp_path, {"x": x, "y": y, "load": np.ones(len(x))})
     with pytest.raises(MistakesError, match=re.escape(f"{tmp_path / name}: positions: {cause}")):
-        read_loads(tmp_path / name, scene, Manner())
+        read_forces(tmp_path / name, scene, Manner())
 
 
 def on_square() -> cr.Contact:
@@ -336,7 +336,7 @@ def test_positions_of_contact_points(tmp_path: Path) -> None:
     scene, loads = on_square().scene, on_square().loads
     x, y = scene.contact_points.T
     name = put(tmp_path, {"x": x[::-1], "y": y[::-1], "load": loads[::-1]})
-    claimed = read_loads(tmp_path / name, scene, Manner(tolerance=1e-5))
+    claimed = read_forces(tmp_path / name, scene, Manner(tolerance=1e-5))
     np.testing.assert_array_equal(claimed.values, loads)
 
 
@@ -351,7 +351,7 @@ def test_headers_of_nodes_at_a_square_lattice(tmp_path: Path) -> None:
     for moved, said in ((1e-3 * nodes, scales), (np.add(nodes, [0.02, 0]), shifts)):
         columns = {"x": moved[:, 0], "y": moved[:, 1], "load": shares}
         with pytest.raises(MistakesError, match=re.escape(said)):
-            read_loads(tmp_path / put(tmp_path, columns), scene, Manner(nodes=True))
+            read_forces(tmp_path / put(tmp_path, columns), scene, Manner(nodes=True))
 
 
 # Units

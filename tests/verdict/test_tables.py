@@ -15,8 +15,7 @@ from convexrough.run.asperity_file import read_summits
 from convexrough.run.scene_file import read_scene
 from convexrough.tabular.roles import Reading
 from convexrough.tabular.units import UnitNames
-from convexrough.verdict.claims import Claimed, Manner, read_shear_forces
-from convexrough.verdict.claims import read_loads as read_with
+from convexrough.verdict.claims import Claimed, Manner, read_forces
 
 PLACES = [[0.0, 0.0], [1.0, 0.0], [0.5, 2.5]]
 LOADS = [1.5, 0.0, 2.5e-5]
@@ -26,7 +25,7 @@ SMALL = cr.Scene(1.0, cr.Asperities(PLACES, 0.1), cr.Material(1.0, 0.3), geometr
 
 
 def read_loads(path: Path, scene: cr.Scene = SMALL, **how: Any) -> Claimed:
-    return read_with(path, scene, Manner(**how))
+    return read_forces(path, scene, Manner(**how))
 
 
 def read(
@@ -175,7 +174,7 @@ def test_parquet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_shear_forces_with_statuses(tmp_path: Path) -> None:
     content = "status,force [N],x,y\nopen,0,1,0\nsliding,-2,0,0\npartial,1,0.5,2.5\n"
-    found = read_shear_forces(tmp_path / put(tmp_path, content), SMALL, Manner())
+    found = read_forces(tmp_path / put(tmp_path, content), SMALL, Manner(), "force")
     assert found.values.tolist() == [-2, 0, 1]
     assert found.status is not None
     assert found.status.tolist() == ["sliding", "open", "partial"]
