@@ -221,11 +221,12 @@ def sequence(what: str, values: object, expected: str) -> None:
         raise InputError(what, found=shown(values), expected=expected)
 
 
-def exactly_one(first: str, a: object, second: str, b: object) -> None:
-    """Raise InputError unless exactly one of two values is None."""
+def exactly_one(first: str, a: Any, second: str, b: Any) -> tuple[str, Any]:
+    """The name and the value of the one that is not None; raises InputError for none or both."""
     if (a is None) == (b is None):
         found = "neither" if a is None else "both"
         raise InputError(f"{first}, {second}", found=found, expected="exactly one of the two")
+    return (first, a) if b is None else (second, b)
 
 
 def fits_in_memory(

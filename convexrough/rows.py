@@ -64,10 +64,8 @@ class PressedRows(NamedTuple):
     def cycles(
         self, upper: Array, lower: Array, friction: Array
     ) -> tuple[NDArray[np.bool_], dict[str, NDArray[Any]]]:
-        """A mask (m,) of the proved cycles, and the fields of `Cycles` for these rows, by name.
-
-        upper, lower : (m,) [force] largest and smallest shear forces;  friction : (m,) coefficients
-        """
+        """A mask (m,) of the proved cycles between the shear forces upper and lower (m,) [force],
+        with friction coefficients (m,); and the fields of `Cycles` for these rows, by name."""
         problem, high, units = self.problem, self.high, self.problem.units
         f, nu = Ball.exact(friction), Ball.exact(problem.scene.material.poisson_ratio)
         half = (Ball.exact(upper) - Ball.exact(lower)) * 0.5
@@ -98,10 +96,8 @@ class PressedRows(NamedTuple):
 
 
 def in_rows(scenes: Sequence[Scene], controls: Array, by_load: bool) -> list[PressedRows]:
-    """Stacks of the scenes that can be pressed and proved together.
-
-    controls : (m,) loads [force] if `by_load` is True, else approaches [length]
-    """
+    """Stacks of the scenes that can be pressed and proved together. The controls (m,) are loads
+    [force] if `by_load` is True, else approaches [length]."""
     if not scenes or len(scenes[0]) > MOST:
         return []
     families: dict[tuple[Any, ...], list[int]] = {}

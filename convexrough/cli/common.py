@@ -28,10 +28,8 @@ Decorator = Callable[[Callable[..., int]], Callable[..., int]]
 
 
 def option(usage: str, text: str, kind: Any = None, *, name: str = "", **more: Any) -> Decorator:
-    """A decorator that adds an option. Without a value in its usage and a kind, it is a flag.
-
-    usage, text : as in the help, such as "--load P";  name : of the argument, if not that of usage
-    """
+    """A decorator that adds an option, with a usage such as "--load P"; without a value in it and a
+    kind, it is a flag. `name` is that of the argument, if not that in the usage."""
     flag, _, value = usage.partition(" ")
     names = (flag, name) if name else (flag,)
     how: dict[str, Any] = {"is_flag": True} if kind is None and not value else {"type": kind}
@@ -170,10 +168,8 @@ def say_aside(*parts: str) -> None:
 
 @contextmanager
 def progress(message: str) -> Iterator[None]:
-    """Show a line on a terminal, with records of our logger, while the body of `with` runs.
-
-    What the body prints, such as a user's solver, and records of level NOTE go to standard error.
-    """
+    """Show a line on a terminal, with records of our logger, while the body of `with` runs. What
+    the body prints, such as a user's solver, and records of level NOTE go to standard error."""
     from convexrough.progress import NOTE, logged
 
     with ExitStack() as stack:

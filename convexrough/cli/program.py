@@ -1,7 +1,5 @@
-"""The program: its commands, exit statuses and error messages.
-
-Each command imports slow modules only when it runs.
-"""
+"""The program: its commands, exit statuses and error messages. Each command imports slow modules
+only when it runs."""
 
 from __future__ import annotations
 

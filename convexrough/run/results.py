@@ -88,17 +88,13 @@ def prove_results(results: Sequence[Result], warn: Callable[[str], None]) -> Pro
 
 @dataclass
 class Writer:
-    """A folder of results that receives files. All methods raise FileError.
+    """A folder of results that receives files. All methods raise FileError."""
 
-    folder  : the final folder;  path : the temporary folder;  files : the files written so far
-    formats : file name extensions of figures;  dpi : pixels per inch of figures
-    """
-
-    folder: Path
-    path: Path
-    formats: Sequence[str] = ("png",)
-    dpi: int = 200
-    files: list[Path] = field(default_factory=list)
+    folder: Path  # the final one
+    path: Path  # the temporary folder
+    formats: Sequence[str] = ("png",)  # file name extensions of figures
+    dpi: int = 200  # pixels per inch of figures
+    files: list[Path] = field(default_factory=list)  # those written so far
 
     def text(self, name: str, text: str | bytes) -> None:
         self.files.append(write_text(self.path / name, text))
@@ -240,8 +236,7 @@ def versions() -> dict[str, str]:
     return {name: metadata.version(name) for name in NUMERICAL}
 
 
-def write_rows(path: Path, rows: Iterable[Iterable[Any]]) -> Path:
-    """Write rows as CSV, with floats in full precision; return the path."""
+def write_rows(path: Path, rows: Iterable[Iterable[Any]]) -> None:
+    """Write rows as CSV, with floats in full precision."""
     with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         csv.writer(file, lineterminator="\n").writerows(rows)
-    return path

@@ -67,14 +67,10 @@ def cautions(stages: Iterable[Stage], contact: Contact) -> Iterator[str]:
 
 
 class Stage(FileTable):
-    """A table of the scene file with checked keys, which requests a result of a pressed contact.
+    """A table of the scene file with checked keys, which requests a result of a pressed contact."""
 
-    name    : name of the table
-    numbers : names of the numbers in a row of its result
-    """
-
-    name: ClassVar[str]
-    numbers: ClassVar[tuple[str, ...]] = ()
+    name: ClassVar[str]  # of the table
+    numbers: ClassVar[tuple[str, ...]] = ()  # names of the numbers in a row of its result
 
     @property
     def labels(self) -> Labels:
@@ -116,19 +112,15 @@ def numbers(found: Any, names: Iterable[str]) -> Summary:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Result(Record):
-    """The result of a stage. Summary, tables and printed lines are derived from its `rows`.
+    """The result of a stage. Summary, tables and printed lines are derived from its `rows`."""
 
-    found : objects such as ShearState, one for each row, or one object with arrays along steps
-    printed : names of the printed columns that rows may have; default: all
-    digits, most : of printed numbers; largest number of printed rows, which are the last ones
-    """
-
-    printed: ClassVar[tuple[str, ...]] = ()
-    digits: ClassVar[int] = 7
-    most: ClassVar[int | None] = None
+    printed: ClassVar[tuple[str, ...]] = ()  # the columns that rows may have; default: all
+    digits: ClassVar[int] = 7  # of printed numbers
+    most: ClassVar[int | None] = None  # largest number of printed rows, which are the last ones
 
     stage: Stage
     contact: Contact
+    #: Objects such as ShearState, one for each row, or one object with arrays along steps.
     found: tuple[Any, ...]
 
     @property

@@ -1,7 +1,5 @@
 """The tables of a scene file as one model, with the type of each key and messages for mistakes.
-
-`read_scene` imports this module only when it reads a file.
-"""
+`read_scene` imports this module only when it reads a file."""
 
 from __future__ import annotations
 
@@ -245,7 +243,7 @@ def validate(contents: Mapping[str, Any]) -> tuple[Study | None, list[str]]:
         places = {name: place for place, name in enumerate(contents)}
         errors = error.errors()
         errors.sort(key=lambda each: places.get(str(each["loc"][0]), len(places)))
-        return None, [_said(model, each) for each in errors]
+        return None, [_said(each) for each in errors]
 
 
 T = TypeVar("T", bound=FileTable)
@@ -261,7 +259,7 @@ def validate_table(name: str, keys: Any, model: type[T]) -> tuple[T | None, list
         ]
 
 
-def _said(model: type[Study], error: Any) -> str:
+def _said(error: Any) -> str:
     table, *inner = error["loc"]
     if error["type"] == "missing" and not inner:
         keys = ", ".join(REQUIRED[str(table)].model_fields)

@@ -1,7 +1,5 @@
-"""Types of the values in a scene file, and messages for all mistakes at once.
-
-Only modules that define tables import this one, because pydantic takes 0.1 s to import.
-"""
+"""Types of the values in a scene file, and messages for all mistakes at once. Only modules that
+define tables import this one, because pydantic takes 0.1 s to import."""
 
 from __future__ import annotations
 
@@ -22,7 +20,7 @@ MEANT |= {"nu": "poisson_ratio", "R": "radius", "rho": "tip_radius", "f": "coeff
 MEANT |= {"mu": "coefficient", "P": "load", "D": "approach"}
 MEANT |= {"maximum": "maximum_fraction", "minimum": "minimum_fraction"}  # names in Python
 
-#: A mistake: the key ("" for the whole table) and the message.
+#: A mistake: the key and the message.
 Mistake = tuple[str, str]
 
 
@@ -101,7 +99,7 @@ class FileTable(pydantic.BaseModel):
         """The checked table. Raises ValidationError with all mistakes in values and in keys."""
 
         def told(key: str, said: str) -> InitErrorDetails:
-            return _detail("told", said, (key,) if key else (), keys)
+            return _detail("told", said, (key,), keys)
 
         if not isinstance(keys, dict):
             raise PydanticCustomError("expected", "a table")
@@ -157,8 +155,6 @@ def phrased(error: ErrorDetails) -> str:
     where = f"[{table}] {place.removeprefix('.')}".rstrip()
     if error["type"] == "missing":
         return f"{where}: missing"
-    if not place and error["type"] == "told":
-        return f"{where} {error['msg']}"
     if error["type"] == "told":
         return f"{where}: {error['msg']}"
     found = error["input"]

@@ -36,10 +36,8 @@ def crowding(points: Array, radii: Array) -> float:
 
 
 def refuse_coincident(points: Array, distances: Array) -> None:
-    """Raise InputError if two asperities coincide, or are too near to each other for float64.
-
-    distances : (n,) [length] distance of each point to its nearest neighbour
-    """
+    """Raise InputError if two asperities coincide, or are too near to each other for float64, given
+    the distances (n,) [length] of nearest neighbours."""
     if len(points) < 2:
         return
     rounding = 16 * np.finfo(float).eps * np.abs(points).max()  # far above the rounding of points

@@ -31,15 +31,12 @@ KEPT, NO_SEED = 8, -1
 
 @dataclass(frozen=True)
 class Tables:
-    """The scenes of the sweep file at `path`; `tables` is this file except its table [sweep].
-
-    inputs : the digests of the files of asperities, by name
-    """
+    """The scenes of the sweep file at `path`."""
 
     grid: Grid
-    tables: Mapping[str, Any]
+    tables: Mapping[str, Any]  # the file except its table [sweep]
     path: Path
-    inputs: Mapping[str, str]
+    inputs: Mapping[str, str]  # the digests of the files of asperities, by name
 
     @property
     def count(self) -> int:

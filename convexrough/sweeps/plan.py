@@ -35,14 +35,11 @@ MOST_SCENES, MOST_ASPERITIES, LEAST_BATCHES, TRIED = 1000, 100_000, 32, 5
 
 @dataclass(frozen=True)
 class Plan:
-    """What a sweep computes: scenes from `source`, and the numbers in `columns` for each scene.
-
-    manifest : the contents of manifest.json
-    """
+    """What a sweep computes: scenes from `source`, and the numbers in `columns` for each scene."""
 
     source: Source
     columns: tuple[Column, ...]
-    manifest: Mapping[str, Any]
+    manifest: Mapping[str, Any]  # the contents of manifest.json
 
     def batch(self, part: range) -> Batch:
         return Batch(self.source.part(part), self.columns, part)
@@ -146,9 +143,7 @@ def plan_of_scenes(
     for i, scene in enumerate(scenes):
         checks.instance(f"scenes[{i}]", scene, Scene)
     checks.some("scenes", scenes)
-    checks.exactly_one("approach", approach, "load", load)
-    name, control = ("approach", approach) if load is None else ("load", load)
-    assert control is not None  # exactly_one
+    name, control = checks.exactly_one("approach", approach, "load", load)
     controls = checks.array(name, control, length=len(scenes), one="scene").tolist()
     expected = 'a list of numbers of a summary, such as ["load"]'
     checks.sequence("measure", measure, expected)
@@ -194,7 +189,7 @@ def _planned(
     given : all input on which the measured numbers depend, except `measures` and the version
     """
     tried = sorted({(source.count - 1) * k // (TRIED - 1) for k in range(TRIED)})
-    ask = source.part(tried).opened()
+    ask = source.opened()
     wrong: Exception | None = None
     with blamed_on(said["source"], unless_known=True):
         for number in tried:

@@ -165,10 +165,8 @@ def verify_on(
     floor: float = 0.0,
     solved: bool = False,
 ) -> Verdict:
-    """The verdict of `verify` for an assembled problem.
-
-    solved : True to compute `solution` even if the certificate proves the whole claim
-    """
+    """The verdict of `verify` for an assembled problem; if `solved`, with a `solution` even if the
+    certificate proves the whole claim."""
     floor = checks.between("floor", floor, 0, checks.LARGEST)
     within = tolerance("within", within)
     given = checks.array("loads", loads, length=len(problem.scene))

@@ -116,10 +116,7 @@ def limits_of(contact: Contact) -> Summary:
 
 
 def describe(normal: Summary, units: UnitNames) -> list[str]:
-    """The printed report of checked loads or of a contact, in aligned lines.
-
-    normal : a summary, made by `judged_loads` or by a `NormalResult`
-    """
+    """The printed report, in aligned lines, of a summary by `judged_loads` or a `NormalResult`."""
     proof = normal["certificate"]
     able = f"  ({normal['candidates']} could carry load)" if "candidates" in normal else ""
     width, largest = len(str(normal["asperities"])), normal["largest_load"]
