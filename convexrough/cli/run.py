@@ -127,10 +127,10 @@ def _swept(
         with common.progress(str(sweep)), pool as executor:
             table, did = run(plan, executor, out=folder, overwrite=output.force, **options)
     except KeyboardInterrupt:
-        common.say_aside("interrupted", progress_kept(folder, plan))
+        common.say_aside("interrupted", progress_kept(folder))
         return common.INTERRUPTED
     except WorkerError as error:
-        common.say_aside("error", str(error), progress_kept(folder, plan))
+        common.say_aside("error", str(error), progress_kept(folder))
         return common.SOLVER_FAILED
     said = summarise(table, **did)
     output.say(said, [*describe(said), *incomplete(said)], [*cautions(table)])

@@ -258,11 +258,8 @@ def _lattice(
     press_on: Callable[[Asperities], Scene],
     lattice: Callable[..., Asperities],
 ) -> tuple[Scene, float | None]:
-    """The scene with asperities in a pattern, and `highest_approach` of the task.
-
-    Without the key `within`, the pattern has all asperities that could touch at the approach or
-    load in [normal], or at the largest load in another table.
-    """
+    """The scene with asperities in a pattern, and `highest_approach` of the task. Without the key
+    `within`, it has all that could touch in [normal], or at the largest load in another table."""
     tips, deviation, variation = layout.tip_radius, layout.height_std, layout.tip_radius_cv
     rough: Any = {"height_std": deviation, "tip_radius_cv": variation, "seed": seed}
     tip_radius = tuple(tips) if isinstance(tips, list) else tips

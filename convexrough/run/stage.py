@@ -1,8 +1,7 @@
 """Base classes of stages and of their results; docs/architecture.md has an example of 40 lines.
 
-A stage is a table of the scene file that requests a result. Its class checks the keys, and computes
-the result from a pressed contact. Summary, tables, figures and printed lines are derived from the
-result.
+A stage is a table of the scene file. Its class checks the keys, and computes from a pressed contact
+the result, from which summary, tables, figures and printed lines are derived.
 """
 
 from __future__ import annotations
@@ -179,8 +178,7 @@ class Result(Record):
     def tables(self) -> dict[str, Columns]:
         """The tables to write: for each file name without its ending, the columns by name."""
         rows = self.known
-        keys = rows[0] if rows else ()
-        return {self.name: {key: np.array([row[key] for row in rows]) for key in keys}}
+        return {self.name: {key: np.array([row[key] for row in rows]) for key in rows[0]}}
 
     def at_asperities(self, columns: Columns) -> Columns:
         """A table with a row for each asperity: its position x and y, and these columns."""

@@ -47,18 +47,15 @@ class Lattice(Cached):
         frozen(self.basis)
 
     def shrunk(self, along_x: Fraction, along_y: Fraction) -> Lattice | None:
-        """The lattice of points whose coordinates are multiplied by these factors of at most 1.
-
-        None if the new basis is not reduced, or if points are too far from the new sites. The new
-        `site_error` includes rounding errors.
-        """
+        """The lattice of points whose coordinates are multiplied by these factors, at most 1; None
+        if the new basis is not reduced, or if points are too far from the new sites."""
         assert self.unshrunk is None
         times = np.array([float(along_x), float(along_y)])
         basis = times * self.basis
         a, b = basis
         if 2.0 * abs(a @ b) > min(a @ a, b @ b) * (1.0 + 1e-9):
             return None
-        site_error = 2.0 * float(times.max()) * self.site_error
+        site_error = 2.0 * float(times.max()) * self.site_error  # twice, for rounding errors
         made = Lattice(times * self.origin, basis, site_error, (along_x, along_y), self.basis)
         return made if site_error <= 4.0 * CLOSEST * made.spacing else None
 
@@ -76,11 +73,8 @@ class Lattice(Cached):
 
     @classmethod
     def through(cls, points: Array) -> Lattice | None:
-        """The lattice on which these points (n, 2) lie, up to rounding, each on its own site.
-
-        None if there is no such lattice, if its spacing is too small for float64, or if it has far
-        more sites than points.
-        """
+        """The lattice on which these points (n, 2) lie, up to rounding, each on its own site; None
+        if its spacing is too small for float64, or if it has far more sites than points."""
         anchor = points[np.argmin(((points - points.mean(axis=0)) ** 2).sum(axis=1))]
         basis, reach = _shortest(points - anchor), float(np.abs(points).max())
         if basis is None or np.hypot(*basis[0]) < max(SMALLEST, FINEST * reach):

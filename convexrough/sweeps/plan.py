@@ -50,9 +50,8 @@ def plan_of(
     path: Path = Path("sweep"),
     measure: Sequence[str] | None = None,
 ) -> Plan:
-    """The plan of a sweep file, or of the tables of the sweep file at `path`.
-
-    measure : replaces the list of numbers in the file
+    """The plan of a sweep file, or of the tables of the sweep file at `path`; a list `measure`
+    replaces that of the file.
 
     Raises FileError, MistakesError, InputError; and the last error if `TRIED` scenes all fail.
     """

@@ -14,7 +14,6 @@ from convexrough.run.results import Writer, headed
 from convexrough.run.stage import Summary
 from convexrough.sweeps.batch import Columns
 from convexrough.sweeps.folder import MANIFEST
-from convexrough.sweeps.plan import Plan
 from convexrough.sweeps.table import SweepTable, open_sweep
 from convexrough.tabular.columns import aligned, labelled
 
@@ -89,10 +88,10 @@ def write_summary(new: Writer, table: SweepTable, found: Columns) -> None:
             new.figures({f"{name}-over-{key}": figure})
 
 
-def progress_kept(folder: Path, plan: Plan) -> str:
+def progress_kept(folder: Path) -> str:
     """A message: how many rows of an interrupted sweep are kept, and how to continue."""
     if not (folder / MANIFEST).exists():
         return "nothing was computed yet"
-    rows = len(open_sweep(folder))
-    more = "; the same command with --resume computes the rest" if rows else ""
-    return f"{rows:,} of {plan.source.count:,} scenes are kept in {folder}{more}"
+    table = open_sweep(folder)
+    more = "; the same command with --resume computes the rest" if len(table) else ""
+    return f"{len(table):,} of {table.scenes:,} scenes are kept in {folder}{more}"

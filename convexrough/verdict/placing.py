@@ -119,11 +119,9 @@ class Placing:
         return owners
 
     def _by_discs(self, values: Array, owners: Indices) -> tuple[Indices, Array]:
-        """(m,) the asperity of each node, and (n,) the radii a_i of the discs under the sums.
-
-        It has the least r_i^2 - a_i^2, with its distance r_i from the node. So discs that do not
-        overlap keep all of their nodes. If one reaches beyond its neighbour, the nearest are taken.
-        """
+        """(m,) the asperity of each node, the one with the least r_i^2 - a_i^2 at the distance r_i;
+        and (n,) the radii a_i of the discs under the sums. So discs that do not overlap keep all of
+        their nodes. If one reaches beyond its neighbour, the nearest are taken."""
         from scipy.spatial import cKDTree  # takes 0.1 s to import
 
         def discs(owners: Indices) -> Array:
