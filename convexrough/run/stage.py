@@ -51,9 +51,6 @@ KINDS = {
 }  # fmt: skip
 KIND = {name: kind for kind, names in KINDS.items() for name in names}
 
-#: Largest number of printed rows of a table of steps.
-MOST_PRINTED = 20
-
 
 def cautions(stages: Iterable[Stage], contact: Contact) -> Iterator[str]:
     """Warnings about the contact at the largest load of a stage, if that exceeds `contact.load`."""
@@ -229,7 +226,7 @@ class Result(Record):
 class Steps(Result):
     """The result of a stage with consecutive steps, as one object with arrays along the steps."""
 
-    most = MOST_PRINTED
+    most = 20
 
     def rows(self) -> list[Summary]:
         (found,) = self.found

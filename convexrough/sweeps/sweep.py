@@ -16,7 +16,7 @@ from datetime import timedelta
 from itertools import islice
 from pathlib import Path
 from types import ModuleType
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,9 +32,6 @@ from convexrough.sweeps.plan import Plan, plan_of, plan_of_scenes
 from convexrough.sweeps.table import SweepTable
 from convexrough.threads import cores
 
-#: The first argument of `sweep`: a sweep file, the tables of a sweep file, or scenes.
-What: TypeAlias = str | os.PathLike[str] | Mapping[str, Any] | Iterable[Scene]
-
 #: Largest number of scenes that one call computes; for more, each call computes a share.
 MOST = 10**8
 
@@ -47,7 +44,7 @@ SHELTER = threading.Lock()
 
 
 def sweep(
-    what: What,
+    what: str | os.PathLike[str] | Mapping[str, Any] | Iterable[Scene],
     *,
     measure: Sequence[str] | None = None,
     out: str | os.PathLike[str] | None = None,

@@ -17,7 +17,6 @@ from convexrough import checks
 from convexrough.arrays import Array, Indices
 from convexrough.contact import discs_of
 from convexrough.errors import InputError
-from convexrough.scene.neighbours import nearest_distances
 from convexrough.scene.scene import Scene
 from convexrough.tabular.columns import bound
 from convexrough.tabular.roles import is_index
@@ -219,7 +218,7 @@ class Placing:
         """(n,) [length] the distance of each asperity from its nearest neighbour, if it has one."""
         if len(self.scene) == 1:
             return np.array([np.min(self.scene.sphere_radius)])
-        return nearest_distances(self.scene.asperities.positions)
+        return self.scene.asperities.layout.nearest
 
     @cached_property
     def _spacing(self) -> float:
