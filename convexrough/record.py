@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, TypeAlias
 
 import numpy as np
@@ -32,6 +32,7 @@ COUNTS = ("seconds", "iterations", "presses", "summits", "contacts")
 FEW, LINE = 4, 76
 
 
+@dataclass(frozen=True, eq=False, repr=False)
 class Record:
     """Base class of results. `repr` gives a line for each field that is not empty."""
 
@@ -58,7 +59,7 @@ class Record:
 
     def __getstate__(self) -> dict[str, Any]:
         """The fields by name, without results that are cached on the object."""
-        return {each.name: getattr(self, each.name) for each in self._fields()}
+        return {each.name: getattr(self, each.name) for each in fields(self)}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         for value in state.values():
@@ -66,11 +67,8 @@ class Record:
                 value.flags.writeable = False  # pickles do not store this flag
         self.__dict__.update(state)
 
-    def _fields(self) -> Any:
-        return fields(self)  # type: ignore[arg-type]
-
     def _rows(self) -> Iterator[tuple[str, str]]:
-        for name in (*self._shown, *(each.name for each in self._fields() if each.repr)):
+        for name in (*self._shown, *(each.name for each in fields(self) if each.repr)):
             if text := in_text(getattr(self, name)):  # empty values are left out
                 yield name, text
         scene = getattr(getattr(self, "contact", self), "scene", None)

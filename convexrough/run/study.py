@@ -189,7 +189,8 @@ class Study(FileTable):
                 what = f"[{name}]: unknown table" if a_table else f"{name}: not in a table"
                 yield name, f"{what}, {nearest(name, cls.model_fields)}"
         if "friction" not in keys:
-            found = (STAGES[name].sheared_by(keys[name]) for name in STAGES if name in keys)
+            further = [name for name in STAGES if name in keys and name != NormalStage.name]
+            found = (STAGES[name].sheared_by(keys[name]) for name in further)
             if sheared_by := next(filter(None, found), ""):
                 yield "friction", f"missing table, needed with {sheared_by}"
         yield from _unbounded(*(keys.get(name) for name in ("asperities", "normal", "sphere")))

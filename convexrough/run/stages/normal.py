@@ -49,10 +49,6 @@ class NormalStage(Stage):
     approach: Finite | None = None
     load: Positive | None = None
 
-    @classmethod
-    def sheared_by(cls, keys: Any) -> str:
-        return ""
-
     def compute(self, contact: Contact) -> NormalResult:
         return NormalResult(self, contact, (contact,))
 
