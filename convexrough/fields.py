@@ -10,7 +10,6 @@ has another shape, InputError is raised.
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import suppress
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -53,10 +52,9 @@ def pressure(contact: Contact, points: ArrayLike) -> Array:
     >>> print(cr.fields.pressure(contact, line).round(4))
     [0.0214 0.     0.0128 0.0128 0.     0.0181]
     """
-    peaks, profile = peak_pressures(contact), hertz.pressure
     touching, centres, radii = _discs(contact)
-    own = peaks[touching]
-    return _sum_over_discs(points, centres, radii, lambda r, i: profile(r, radii[i], own[i]))
+    peaks = peak_pressures(contact)[touching]
+    return _sum_over_discs(points, hertz.pressure, centres, radii, peaks)
 
 
 def normal_displacement(contact: Contact, points: ArrayLike) -> Array:
@@ -87,12 +85,7 @@ def traction(state: ShearState, points: ArrayLike) -> Array:
     >>> print(f"{q / (0.5 * p):.3f}")  # below 1, because the centre sticks
     0.094
     """
-    centres, a, shares, peaks = _sheared(state)
-
-    def profile(r: Array, disc: Indices) -> Array:
-        return np.asarray(surface_shear.traction(r, a[disc], shares[disc], peaks[disc]))
-
-    return _sum_over_discs(points, centres, a, profile)
+    return _sum_over_discs(points, surface_shear.traction, *_sheared(state))
 
 
 def shear_displacement(state: ShearState, points: ArrayLike) -> Array:
@@ -144,25 +137,25 @@ def cell_areas(points: Array) -> Array:
     """
     from scipy.spatial import QhullError, Voronoi  # takes 0.1 s to import
 
-    areas: Array = np.full(len(points), np.nan)
-    with suppress(QhullError, ValueError):  # at most three points, or all on one line
+    areas: Array = np.zeros(len(points))
+    try:
         cells = Voronoi(points)
-        around = [cells.regions[cell] for cell in cells.point_region]  # corners in order
-        some = [i for i, each in enumerate(around) if -1 not in each]  # -1 is at infinity
-        closed = [[*around[i], around[i][0]] for i in some]
-        counts = np.array([len(each) for each in closed])
-        x, y = (cells.vertices[np.concatenate(closed)] - np.repeat(points[some], counts, 0)).T
-        twice = np.append(x[:-1] * y[1:] - x[1:] * y[:-1], 0.0)
-        ends = np.cumsum(counts)
-        twice[ends - 1] = 0.0  # from one cell to the next
-        areas[some] = np.abs(np.add.reduceat(twice, ends - counts)) / 2.0
+    except (QhullError, ValueError):  # at most three points, or all on one line
+        return np.full(len(points), np.nan)
+    pairs, ends = cells.ridge_points.T, np.array(cells.ridge_vertices).T
+    apart, edge = (np.hypot(*(it[0] - it[1]).T) for it in (points[pairs], cells.vertices[ends]))
+    # An edge lies halfway between two points, at a right angle to the line through them.
+    part = np.where((ends >= 0).all(axis=0), apart * edge / 4, np.nan)  # -1 is at infinity
+    for side in pairs:
+        np.add.at(areas, side, part)
     return areas
 
 
 def _sum_over_discs(
-    points: ArrayLike, centres: Array, radii: Array, profile: Callable[[Array, Indices], Array]
+    points: ArrayLike, profile: Callable[..., Array], centres: Array, radii: Array, *more: Array
 ) -> Array:
-    """(...) sum_i profile(|r - r_i|, i) over the discs that may contain the point r."""
+    """(...) sum_i profile(|r - r_i|, radii[i], ...) over the discs that may contain the point r;
+    the dots are the elements i of the arrays in `more`."""
     flat, shape = _places(points)
     if len(flat) * len(centres) <= FEW_PAIRS:
         apart = np.hypot(*(flat.T[:, None] - centres.T[:, :, None]))
@@ -173,8 +166,8 @@ def _sum_over_discs(
         near = cKDTree(flat).query_ball_point(centres, radii)
         disc = np.repeat(np.arange(len(centres)), [len(inside) for inside in near])
         point = np.array([i for inside in near for i in inside], dtype=np.intp)
-    total = np.zeros(len(flat))
-    np.add.at(total, point, profile(np.hypot(*(flat[point] - centres[disc]).T), disc))
+    total, apart = np.zeros(len(flat)), np.hypot(*(flat[point] - centres[disc]).T)
+    np.add.at(total, point, profile(apart, radii[disc], *(each[disc] for each in more)))
     return total.reshape(shape)
 
 
