@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.ticker import LogLocator, NullFormatter
 
 from convexrough.bench.rows import Bench, Row, frontier
 from convexrough.bench.scenes import FAMILIES, Family
@@ -39,10 +38,7 @@ EXACT = 1e-17
 
 
 def work_figure(bench: Bench) -> Figure:
-    """The figure of time against true error, with a panel for each scene; lower left is better.
-
-    The frontier is grey.
-    """
+    """The figure of time against true error, with a panel for each scene; lower left is better."""
     scenes = [it for it in bench.panels().items() if any(row.known for row in it[1])]
     columns = min(COLUMNS, max(1, len(scenes)))
     rows = max(1, -(-len(scenes) // columns))
@@ -60,8 +56,8 @@ def work_figure(bench: Bench) -> Figure:
     figure.supylabel("seconds", fontsize=LABEL)
     shown = {name: handles[name] for name in (*LOOKS, "frontier") if name in handles}
     labels = ["newton (default)" if name == "newton" else name for name in shown]
-    lines = list(shown.values())
-    figure.legend(lines, labels, loc="outside upper center", ncols=3, fontsize=TICK, frameon=False)
+    how = {"handles": [*shown.values()], "labels": labels, "ncols": 3}
+    style.legend(figure, "outside", loc="outside upper center", **how)
     return figure
 
 
@@ -76,8 +72,9 @@ def _draw_panel(axes: Axes, rows: list[Row]) -> None:
         # Extend the frontier to errors above that of the fastest point.
         x, y = np.append(x, 10.0), np.append(y, y[-1])
         axes.step(x, y, "-", where="post", color=FAINT, lw=2.5, zorder=0, label="frontier")
-    axes.xaxis.set_major_locator(LogLocator(base=1e4, numticks=6))
-    _plain(axes)
+    style.log_ticks(axes.xaxis, most=5)
+    style.log_ticks(axes.yaxis)
+    axes.tick_params(labelsize=TICK)
 
 
 def _coordinates(rows: Iterable[Row]) -> tuple[Any, Any]:
@@ -99,13 +96,8 @@ def cost_figure(bench: Bench) -> Figure:
             if family == "lattice":
                 axes.plot(x, 0.6 * min(y / x) * x, ":", color="0.3", lw=1.0, label="slope 1")
     if axes.lines:
-        axes.legend(fontsize=TICK, frameon=False, loc="lower right")
+        style.legend(axes, "inside", loc="lower right")
     style.label(axes, "asperities", "seconds for a certified press")
-    _plain(axes)
+    style.log_ticks(axes.xaxis)
+    style.log_ticks(axes.yaxis)
     return figure
-
-
-def _plain(axes: Axes) -> None:
-    axes.xaxis.set_minor_formatter(NullFormatter())
-    axes.yaxis.set_minor_formatter(NullFormatter())
-    axes.tick_params(labelsize=TICK)

@@ -100,10 +100,7 @@ class Bench:
         return [row for row in rows if row.asperities >= least]
 
     def exponent(self, family: Family) -> float:
-        """The exponent b of the time n^b to press n >= `FITTED_FROM` asperities.
-
-        The least-squares fit is  log time = a + b log n;  nan for fewer than two sizes.
-        """
+        """The exponent b of the time n^b to press n >= `FITTED_FROM` asperities; nan if unknown."""
         large = [(row.asperities, row.seconds) for row in self.presses(family, FITTED_FROM)]
         if len({size for size, _ in large}) < 2:
             return math.nan
@@ -151,10 +148,7 @@ def frontier(rows: Iterable[Row]) -> list[Row]:
 
 
 def better_than_default(rows: Iterable[Row]) -> list[Row]:
-    """Points as accurate as the default solver's, and faster by more than `NOISE`.
-
-    All points if the default solver has none.
-    """
+    """Points as accurate as the default's, and faster by more than `NOISE`; all if it has none."""
     points = [row for row in rows if row.known]
     default = next((row for row in points if row.default), None)
     if default is None:

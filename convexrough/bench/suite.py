@@ -114,18 +114,13 @@ def run(*, quick: bool) -> Bench:
 
 
 def _panel(family: Family, size: int, quick: bool, patience: float) -> list[Row]:
-    """The rows of the attempts on one scene; apparently faster attempts are timed again.
-
-    Left out are attempts that name the operator that the scene has by default, and attempts that
-    are limited to fewer asperities.
-    """
+    """The rows of the attempts on one scene; apparently faster attempts are timed again."""
     LOGGER.info(f"{family}, about {size:,}: reference")
-    each, right, rows = scene(family, REFINEMENTS[size]), None, list[Row]()
+    each, rows = scene(family, REFINEMENTS[size]), list[Row]()
     usual = NormalProblem.assemble(each, approach=APPROACH).influence.name
-    with suppress(SolverError):
-        right = measure.reference(each)
+    right = measure.reference(each)
     fitting = [attempt for attempt in attempts(quick) if len(each) <= attempt.most]
-    tried = [attempt for attempt in fitting if attempt.influence != usual]
+    tried = [attempt for attempt in fitting if attempt.influence != usual]  # it is that of None
     for attempt in tried:
         LOGGER.info(f"{family}, about {size:,}: {attempt.solver}, {attempt.setting}")
         rows.append(measure.measure_attempt(family, each, attempt, right, patience))
@@ -162,10 +157,7 @@ def describe_machine() -> dict[str, Any]:
 
 
 def write_bench(new: Writer, bench: Bench, *, figures: bool, page: Path | None) -> None:
-    """Write bench.json, rows.csv and the figures, and the results into `page` if that is given.
-
-    Raises FileError; files already written remain.
-    """
+    """Write bench.json, rows.csv and the figures, and the results into `page`, if one is given."""
     new.summary("bench.json", bench.summary())
     new.tables({"rows": {it.name: [getattr(row, it.name) for row in bench.rows]
                          for it in fields(Row)}})  # fmt: skip
