@@ -57,8 +57,7 @@ class PaperStates:
         self.contact = contact
         self.limit = limit = checks.friction(contact.scene.friction) * contact.load
         groups = rings(contact.scene.asperities.distances, contact.loads)
-        letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"[len(groups) - 1 :: -1]
-        self.named: dict[str, Indices] = dict(zip(letters, groups, strict=True))
+        self.named: dict[str, Indices] = dict(zip(RINGS, groups, strict=True))
         self.firsts = {name: int(ring[0]) for name, ring in self.named.items()}
         self.onsets: Array = cr.onset_of_sliding(contact) / limit
         self.half = cr.shear(contact, force=SHARE * limit)

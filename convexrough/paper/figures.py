@@ -27,10 +27,7 @@ from convexrough.sphere.smooth import smooth
 
 
 def paper_figures(found: PaperStates) -> Figures:
-    """The figures of the paper's example, for asperities in at most 26 rings, without units.
-
-    Rings have letters as in the paper: A is the outermost. States are those at Q / (f P) = 0.5.
-    """
+    """The figures of the paper's example, without units. States are those at Q / (f P) = 0.5."""
     scale, loops = Scale(found.contact), ([found.steady], [found.loop])
     return Figures(
         fig3_pressure=pressure_figure(scale),

@@ -93,8 +93,7 @@ def draw_map(
             draw_discs(axes, points, each)
     draw_outline(axes, outline)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
-    axes.xaxis.set_major_locator(style.round_ticks(5))
-    axes.yaxis.set_major_locator(style.round_ticks(5))
+    style.few_ticks(axes)
     style.label(axes, length.label("x"), length.short("y"))
 
 
@@ -230,11 +229,7 @@ def even_radius(points: Array) -> float:
 
 
 def _draw_mosaic(axes: Axes, points: Array, shades: Array, low: Array, high: Array) -> None:
-    """Draw a mosaic in the square with the corners `low`, `high`.
-
-    A pixel with several asperities has their mean colour; any other pixel has the colour of the
-    nearest asperity, or none if this asperity is far away.
-    """
+    """Draw a mosaic, as at `CROWDED`, in the square with the corners `low`, `high`."""
     from scipy.spatial import cKDTree  # 0.1 s to import: only when asked
 
     width = high[0] - low[0]

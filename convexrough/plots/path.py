@@ -150,11 +150,7 @@ def _parts(each: int) -> Array:
 
 
 def _finer(path: LoadPath) -> LoadPath:
-    """The path with points added between the given ones.
-
-    The path is unchanged if these points cost too much, if order fails, if nothing touches, or if a
-    path of varying load starts from a pressed contact. The function may solve normal problems.
-    """
+    """The path with points added in between, for which it may solve problems, if they are cheap."""
     m, touching = max(1, len(path.forces)), max(1, int(np.count_nonzero(path.contact.loads)))
     most = MOST_BETWEEN if path.load_constant else MOST_VARYING
     each = min(MOST_POINTS // m, AFFORDABLE // touching // m, most)

@@ -64,10 +64,7 @@ def draw_one_state(axes: Axes, state: State) -> None:
 
 
 def draw_state(axes: Axes, state: State, scale: Scale, space: str = " ") -> None:
-    """Draw contact discs, stick discs and open dots, and the outlines of the smooth contact.
-
-    The title is the shear force divided by f P and, after `space`, how many asperities slide.
-    """
+    """Draw discs, dots and outlines of the smooth contact; `space` is a blank of the title."""
     look: Any = {"stick": state.stick_radii, "outline": scale.axes}
     radii = state.contact.contact_radii
     maps.draw_statuses(axes, scale.points, scale.length, state.status, radii, **look)

@@ -123,8 +123,7 @@ def label_plane(axes: Axes, most: float, force_unit: str = "") -> style.Measure:
     """Label both axes and draw |T| = P (gross sliding). Returns the measure of both axes."""
     unit = style.measure(most, force_unit, "P_m")
     _draw_cross(axes, unit, most, color=ink(), lw=0.7)
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(style.round_ticks(5))  # does not depend on the layout
+    style.few_ticks(axes)
     T = "T = Q/f" if unit.said and not unit.symbol else "T"
     style.label(axes, unit.label("P"), unit.short(T))
     return unit

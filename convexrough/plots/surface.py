@@ -68,8 +68,7 @@ def draw_surface(axes: Axes, surface: Surface) -> tuple[AxesImage, style.Measure
     image = axes.imshow(z.of(surface.heights), origin="lower", extent=whole, cmap="gray",
                         interpolation="nearest", rasterized=True)  # fmt: skip
     style.label(axes, x.short("x"), x.short("y"))
-    axes.xaxis.set_major_locator(style.round_ticks())
-    axes.yaxis.set_major_locator(style.round_ticks())
+    style.few_ticks(axes)
     return image, x, z
 
 
@@ -92,9 +91,8 @@ def draw_provability(axes: Axes, curve: Provability) -> None:
 
 
 def _provability_figure(curve: Provability, chosen: float) -> Figure:
-    """The figure of contacts, crowding and model error against pruning, with a dotted line at the
-    chosen one. Prunings below the smallest at which the assumptions of the asperity model are met
-    are shaded."""
+    """Contacts, crowding and model error against pruning: dotted at the chosen one, grey below the
+    smallest at which the assumptions of the asperity model are met."""
     figure, (upper, middle, lower) = panels(SINGLE, 5.0, 3, 1)
     draw_provability(upper, curve)
     upper.legend(fontsize=TICK - 1, frameon=False, loc="lower left", handlelength=1.6)
