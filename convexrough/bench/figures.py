@@ -31,8 +31,6 @@ LOOKS: dict[str, dict[str, Any]] = {
 #: Marker of each family of scenes.
 MARKERS: dict[Family, str] = {"lattice": "o", "rough": "^", "scattered": "s"}
 
-COLUMNS = 3
-
 #: Smaller errors, such as 0, are drawn at this value, because the axis is logarithmic.
 EXACT = 1e-17
 
@@ -40,7 +38,7 @@ EXACT = 1e-17
 def work_figure(bench: Bench) -> Figure:
     """The figure of time against true error, with a panel for each scene; lower left is better."""
     scenes = [it for it in bench.panels().items() if any(row.known for row in it[1])]
-    columns = min(COLUMNS, max(1, len(scenes)))
+    columns = min(3, max(1, len(scenes)))
     rows = max(1, -(-len(scenes) // columns))
     figure, grid = panels(DOUBLE, 2.1 * rows + 0.9, rows, columns, sharex=True)
     for axes in grid[len(scenes) :]:

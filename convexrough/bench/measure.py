@@ -17,7 +17,7 @@ from convexrough.bench.rows import Row
 from convexrough.bench.scenes import APPROACH, REFINEMENTS, Family, scene
 from convexrough.contact import Contact, press
 from convexrough.errors import InputError, SolverError
-from convexrough.friction.path import LoadPath, load_path
+from convexrough.friction.path import load_path
 from convexrough.friction.shear import shear
 from convexrough.friction.steady import cycle, cycles
 from convexrough.influence import Kind
@@ -38,10 +38,8 @@ LEAST_RUNS, MOST_RUNS = 3, 25
 #: Number of timed products (`plain_product`), of which the fastest is the unit of time.
 PRODUCTS = 8
 
-#: Vertices (P, Q / f) of a load path, divided by the load at the paper's approach.
-CORNERS = np.array(
-    [(0.6, 0), (0.6, 0.3), (1, 0.3), (1, -0.15), (0.7, -0.15), (0.7, 0.2), (0.5, 0.1)]
-)
+#: P and Q / f at the vertices of a load path, divided by the load at the paper's approach.
+CORNERS = np.array([(0.6, 0.6, 1, 1, 0.7, 0.7, 0.5), (0, 0.3, 0.3, -0.15, -0.15, 0.2, 0.1)])
 
 #: Amplitudes of a loss curve, divided by the friction limit.
 PARTS_OF_LIMIT = np.linspace(0.02, 0.98, 49)
@@ -72,11 +70,6 @@ class Attempt:
 _pressed = partial(press, approach=APPROACH)
 
 
-def _along_corners(contact: Contact) -> LoadPath:
-    P, T = CORNERS.T
-    return load_path(contact.scene, loads=contact.load * P, forces=limit(contact) * T)
-
-
 #: The tasks that are timed at many sizes, by name: the preparation of an argument from a function
 #: that makes the scene, and the function of this argument that is timed.
 TASKS: dict[str, tuple[Callable[[Make], Any], Callable[[Any], object]]] = {
@@ -87,7 +80,10 @@ TASKS: dict[str, tuple[Callable[[Make], Any], Callable[[Any], object]]] = {
         lambda make: _pressed(make()),
         lambda it: cycles(it, limit(it) * PARTS_OF_LIMIT),
     ),
-    "load path": (lambda make: _pressed(make()), _along_corners),
+    "load path": (
+        lambda make: _pressed(make()),
+        lambda it: load_path(it.scene, loads=it.load * CORNERS[0], forces=limit(it) * CORNERS[1]),
+    ),
     "gradient": (
         lambda make: cycle(it := _pressed(make()), maximum=0.5 * limit(it)),
         lambda it: it.gradient(holding="load"),

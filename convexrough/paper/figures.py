@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
-from matplotlib.patheffects import withStroke
 
 from convexrough import checks, fields
 from convexrough.arrays import Array
@@ -49,11 +48,10 @@ def _rings_figure(found: PaperStates, scale: Scale) -> Figure:
     left, right = chart.get_xlim()
     chart.set(xlim=(1.08 * left, 1.08 * right), ylim=(1.08 * left, 1.08 * right))  # for letters
     shifted = contact.scene.contact_points + np.array([0.015 * scale.typical, 0.0])
-    halo = [withStroke(linewidth=1.5, foreground="white")]
     for name, ring in named.items():
         for i in ring:
             x, y = scale.length.of(shifted[i] + np.array([contact.contact_radii[i], 0.0]))
-            chart.text(x, y, name, va="center", fontsize=7, path_effects=halo, clip_on=True)
+            chart.text(x, y, name, va="center", fontsize=7, path_effects=style.halo(), clip_on=True)
     slides = [name for name, ring in named.items() if (found.half.status[ring] == "sliding").any()]
     style.title(chart, f"slide at $Q/(fP)$ = {SHARE:g}: {', '.join(slides)}", "center")
 

@@ -178,7 +178,7 @@ def ring_colour(order: int, count: int) -> Any:
     return matplotlib.colormaps["viridis"](0.82 * order / max(1, count - 1))
 
 
-def _range(cycle: Cycle, scale: Scale) -> str:
+def _range(cycle: Cycle | Fretting, scale: Scale) -> str:
     high, low = cycle.maximum / scale.limit, cycle.minimum / scale.limit
     if high == -low:
         return f"±{high:.4g}"
@@ -247,9 +247,7 @@ def fretting_figures(worn: Fretting) -> Figures:
         style.title(axes, name)
     for axes in maps:
         axes.label_outer()
-    low, high = worn.minimum / scale.limit, worn.maximum / scale.limit
-    between = f"cycle of $Q/(fP)$ from {low:.4g} to {high:.4g}".replace("-", "\u2212")
-    figure.suptitle(between, fontsize=TICK)
+    figure.suptitle(f"cycle of $Q/(fP)$ = {_range(worn, scale)}", fontsize=TICK)
     return Figures({"fretting": figure})
 
 
