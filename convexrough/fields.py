@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+import scipy  # its parts are imported when they are used
 from numpy.typing import ArrayLike
 
 from convexrough import checks
@@ -135,12 +136,10 @@ def cell_areas(points: Array) -> Array:
     >>> cr.fields.cell_areas(np.array([[0, 0], [1, 0], [0, 1], [-1, 0], [0, -1.0]]))
     array([ 1., nan, nan, nan, nan])
     """
-    from scipy.spatial import QhullError, Voronoi  # takes 0.1 s to import
-
     areas: Array = np.zeros(len(points))
     try:
-        cells = Voronoi(points)
-    except (QhullError, ValueError):  # at most three points, or all on one line
+        cells = scipy.spatial.Voronoi(points)
+    except (scipy.spatial.QhullError, ValueError):  # at most three points, or all on one line
         return np.full(len(points), np.nan)
     pairs, ends = cells.ridge_points.T, np.array(cells.ridge_vertices).T
     apart, edge = (np.hypot(*(it[0] - it[1]).T) for it in (points[pairs], cells.vertices[ends]))
@@ -161,9 +160,7 @@ def _sum_over_discs(
         apart = np.hypot(*(flat.T[:, None] - centres.T[:, :, None]))
         disc, point = np.nonzero(apart <= radii[:, None])
     else:
-        from scipy.spatial import cKDTree  # takes 0.1 s to import
-
-        near = cKDTree(flat).query_ball_point(centres, radii)
+        near = scipy.spatial.cKDTree(flat).query_ball_point(centres, radii)
         disc = np.repeat(np.arange(len(centres)), [len(inside) for inside in near])
         point = np.array([i for inside in near for i in inside], dtype=np.intp)
     total, apart = np.zeros(len(flat)), np.hypot(*(flat[point] - centres[disc]).T)

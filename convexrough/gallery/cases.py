@@ -38,10 +38,8 @@ REVERSALS = 100_000
 class Checked(Record):
     """Comparison of loads or forces with the answer: `HardCase.check` and `check_shear`.
 
-    Indices are those of the scene's asperities.
-
-    wrongly_open   : (m,) asperities that touch and have no given load (or shear force)
-    wrongly_loaded : (m,) asperities that are open and have a given load (or shear force)
+    wrongly_open   : (m,) indices of asperities that touch and have no given load (or shear force)
+    wrongly_loaded : (m,) indices of asperities that are open and have a given load (or force)
     error          : largest error, over the largest load or force of the answer
     within         : the largest error allowed
     """

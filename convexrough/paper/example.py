@@ -11,6 +11,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy  # its parts are imported when they are used
 
 import convexrough as cr
 from convexrough import checks
@@ -70,13 +71,11 @@ class PaperStates:
 
     @cached_property
     def crossing(self) -> float:
-        from scipy.optimize import brentq  # 0.1 s to import: only when asked
-
         def excess(part: float) -> float:
             cycle = cr.cycle(self.contact, maximum=part * self.limit)
             return cycle.loss_normalised - cycle.smooth_normalised
 
-        return float(brentq(excess, 0.2, 0.6, xtol=1e-12))
+        return float(scipy.optimize.brentq(excess, 0.2, 0.6, xtol=1e-12))
 
 
 def scene() -> cr.Scene:

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import matplotlib
 import numpy as np
+import scipy  # its parts are imported when they are used
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import EllipseCollection
@@ -230,14 +231,12 @@ def even_radius(points: Array) -> float:
 
 def _draw_mosaic(axes: Axes, points: Array, shades: Array, low: Array, high: Array) -> None:
     """Draw a mosaic, as at `CROWDED`, in the square with the corners `low`, `high`."""
-    from scipy.spatial import cKDTree  # 0.1 s to import: only when asked
-
     width = high[0] - low[0]
     steps = width * (np.arange(PIXELS) + 0.5) / PIXELS
     places = np.stack(np.meshgrid(low[0] + steps, low[1] + steps), axis=-1)
     # Pixels farther than this from every point stay empty.
     cell = width / np.sqrt(np.count_nonzero(shades[:, 3]))
-    _, nearest = cKDTree(points).query(places, distance_upper_bound=cell)
+    _, nearest = scipy.spatial.cKDTree(points).query(places, distance_upper_bound=cell)
     image = np.vstack((shades, np.zeros(4)))[nearest]
     inside = ((points > low) & (points < high)).all(axis=1)
     column, row = ((points[inside] - low) / width * PIXELS).astype(int).T

@@ -58,9 +58,8 @@ def potential(t: Number) -> Number:
 def loss(t: Number) -> Number:
     """The loss e(t) = 1 - (1 - t)^(5/3) - (5 t / 6) [1 + (1 - t)^(2/3)]  for t >= 0.
 
-    For small t, e is proportional to t^3. A cycle between Q and -Q loses
-    (9 (2 - nu) f^2 P^2 / (5 G a)) e(Q / (f P)) in both bodies, with the shear modulus G and the
-    contact radius a.
+    For small t, e is proportional to t^3. A cycle between Q and -Q loses W0 e(Q / (f P)) in both
+    bodies, with the `energy_scale` W0 of `SmoothSphere`.
     """
     return loss_at(width(t))
 

@@ -14,6 +14,7 @@ from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from convexrough import checks
 from convexrough.arrays import Array, Indices, frozen
@@ -134,8 +135,6 @@ def crowded(contact: Contact, above: float = OVERLAP) -> tuple[Indices, Array]:
     >>> print(len(pairs), f"{values.max() / contact.crowding:.6g}")
     12 1
     """
-    from scipy.spatial import cKDTree  # 0.1 s to import: only when asked
-
     checks.instance("contact", contact, Contact)
     touching = np.flatnonzero(contact.contact_radii)
     points, radii = contact.scene.contact_points[touching], contact.contact_radii[touching]

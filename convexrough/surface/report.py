@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import maximum_filter
 
 from convexrough.contact import Contact
 from convexrough.errors import SolverError
@@ -274,8 +275,6 @@ def warnings_about(scanned: Scanned) -> Iterator[str]:
         mean = f"the mean height is {level:.6g} {surface.unit}".rstrip()
         yield f"{mean}: approaches are measured from height 0; --detrend plane subtracts the mean"
     if surface.filled_pixels is not None:
-        from scipy.ndimage import maximum_filter  # slow to import
-
         near = maximum_filter(surface.filled_pixels, summits.origin.fit)[tuple(summits.pixels.T)]
         if count := np.count_nonzero(near):
             yield f"summits fitted to filled pixels, whose heights are not measured: {count:,}"
