@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from convexrough.comparison import compare, every_solver
-from convexrough.gallery.cases import case, names
+from convexrough.gallery.cases import case
 from convexrough.progress import LOGGER
 from convexrough.solvers import Newton, Solver
 
@@ -19,13 +19,11 @@ FACTORS = (1, 2, 5, 10, 100)
 WITHIN = 1e-3
 
 
-def profile_of(
-    solvers: Sequence[Solver] | None = None, *, cases: Sequence[str] = ()
-) -> list[dict[str, Any]]:
+def profile_of(solvers: Sequence[Solver] | None, cases: Sequence[str]) -> list[dict[str, Any]]:
     """A row for each solver, run once on each hard case (Dolan and More, Math. Program. 91, 201).
 
-    solvers : solver objects; default: every solver of `compare`. Newton's method is always first
-    cases   : names of cases or families; default: all
+    solvers : None for every solver of `compare`; Newton's method is always first
+    cases   : names of cases
 
     A row contains the numbers of cases with each outcome ("right", "wrong", "refused", "failed"),
     and of those in which exactly the asperities that touch have a load. Further entries are the
@@ -33,11 +31,11 @@ def profile_of(
     `outcomes` by case.
     """
     solvers = [Newton(), *(s for s in solvers or every_solver() if s != Newton())]
-    wanted, said = names(*cases), [each.name for each in solvers]
-    seconds = np.full((len(solvers), len(wanted)), np.inf)
+    said = [each.name for each in solvers]
+    seconds = np.full((len(solvers), len(cases)), np.inf)
     outcomes = np.full(seconds.shape, "", dtype="U8")
     sets = np.zeros(seconds.shape, dtype=bool)
-    for column, name in enumerate(wanted):
+    for column, name in enumerate(cases):
         LOGGER.info(name)
         hard = case(name)
         for row, entry in enumerate(compare(hard.scene, **hard.control, solvers=solvers).entries):
@@ -56,5 +54,5 @@ def profile_of(
         counts = {it: own.count(it) for it in ("right", "wrong", "refused", "failed")}
         parts = {f"within {factor}x": float((ratio <= factor).mean()) for factor in FACTORS}
         known = {"solver": solver, **counts, "contact set right": int(right.sum()), **parts}
-        rows.append(known | {"outcomes": dict(zip(wanted, own, strict=True))})
+        rows.append(known | {"outcomes": dict(zip(cases, own, strict=True))})
     return rows

@@ -84,7 +84,7 @@ def _tractions(scale: Scale) -> tuple[float, style.Measure]:
 def _traction_figure(found: PaperStates, scale: Scale) -> Figure:
     """Shear traction of all asperities, and on the central one."""
     state, contact, (f, unit) = found.half, found.contact, _tractions(scale)
-    centre = next(iter(found.firsts.values()))
+    centre = found.firsts["F"]
     figure, (chart, profile) = map_and_profile()
     _draw_tractions(chart, state, scale, unit)
     style.title(chart, f"$Q/(fP)$ = {SHARE:g}")
@@ -106,19 +106,17 @@ def _traction_figure(found: PaperStates, scale: Scale) -> Figure:
 
 def _draw_tractions(axes: Axes, state: ShearState, scale: Scale, unit: style.Measure) -> None:
     """Draw each traction as a stack of discs, from the rim to the stick disc and to the centre."""
-    contact = state.contact
-    touching = contact.loads > 0
-    a, c = contact.contact_radii, np.where(state.status == "sliding", 0.0, state.stick_radii)
-    steps = int(np.clip(1000 // touching.sum(), 8, 24))
-    slip = np.sqrt(1.0 - np.divide(c, a, out=np.zeros(len(a)), where=touching) ** 2)
+    a, c = state.contact.contact_radii, state.stick_radii
+    slip = np.sqrt(1.0 - np.divide(c, a, out=np.zeros(len(a)), where=a > 0) ** 2)
 
     def radii(s: Any) -> Any:
         return np.concatenate((a * np.sqrt(1.0 - (slip * s) ** 2), c * np.sqrt(1.0 - s**2)))
 
+    steps = 24
     s = np.arange(steps)[:, None] / steps
-    middle = radii(s + 0.5 / steps)[..., None] * (1.0, 0.0) + contact.scene.contact_points
-    tractions = np.where(touching, unit.of(np.abs(fields.traction(state, middle))), 0.0)
-    draw_values(axes, scale, tractions, unit.short("q"), radii=np.where(touching, radii(s), 0.0))
+    middle = radii(s + 0.5 / steps)[..., None] * (1.0, 0.0) + scale.points
+    tractions = unit.of(np.abs(fields.traction(state, middle)))
+    draw_values(axes, scale, tractions, unit.short("q"), radii=radii(s))
 
 
 def _section_figure(found: PaperStates, scale: Scale) -> Figure:
