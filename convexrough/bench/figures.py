@@ -16,7 +16,7 @@ from convexrough.plots.style import DOUBLE, FAINT, LABEL, ROUGH, SINGLE, TICK, U
 
 #: Marker, line, face and colour of each solver, all different in grey.
 LOOKS: dict[str, dict[str, Any]] = {
-    "newton": dict(marker="o", color=ROUGH, ms=7, mew=1.2, zorder=5),
+    "newton": dict(label="newton (default)", marker="o", color=ROUGH, ms=7, mew=1.2, zorder=5),
     "newton, dense": dict(marker="o", color="0.35", mfc="white", ms=6, zorder=4),
     "newton, lattice": dict(marker="X", color="0.35", ms=6, zorder=4),
     "newton, scattered": dict(marker="P", color="0.35", ms=6, zorder=4),
@@ -52,10 +52,8 @@ def work_figure(bench: Bench) -> Figure:
         handles |= dict(zip(names, lines, strict=True))
     figure.supxlabel("largest error of a load / largest load", fontsize=LABEL)
     figure.supylabel("seconds", fontsize=LABEL)
-    shown = {name: handles[name] for name in (*LOOKS, "frontier") if name in handles}
-    labels = ["newton (default)" if name == "newton" else name for name in shown]
-    how = {"handles": [*shown.values()], "labels": labels, "ncols": 3}
-    style.legend(figure, "outside", loc="outside upper center", **how)
+    how = {"handles": [*handles.values()], "loc": "outside upper center", "ncols": 3}
+    style.legend(figure, "outside", **how)
     return figure
 
 
@@ -64,7 +62,7 @@ def _draw_panel(axes: Axes, rows: list[Row]) -> None:
     for name, look in LOOKS.items():
         if points := [row for row in rows if row.solver == name and row.known]:
             usual: dict[str, Any] = {"ms": 4.5, "mew": 0.9, "lw": 0.8, "ls": "none"}
-            axes.plot(*_coordinates(points), label=name, **(usual | look))
+            axes.plot(*_coordinates(points), **({"label": name} | usual | look))
     if best := frontier(rows):
         x, y = _coordinates(best)
         # Extend the frontier to errors above that of the fastest point.

@@ -175,10 +175,9 @@ def _timed(
 
 
 def plain_product(scene: Scene) -> float:
-    """[s] the time of the Fourier transforms of one product with the lattice operator.
+    """[s] the time of the transforms of one product with the lattice operator; nan without one.
 
-    It is the least of `PRODUCTS` times of scipy's transforms in float64 on all cores, on a grid
-    twice as wide and high as the lattice; nan without a lattice.
+    They are scipy's, in float64 on all cores, on a grid twice as wide and high as the lattice.
     """
     from scipy import fft
 

@@ -38,8 +38,7 @@ class Row:
         `convexrough.bench.measure.TASKS`
     outcome : "refused" means that the solver does not accept the scene; `message` says why
     seconds : [s] the least of `runs`; for a sweep, the time of one scene
-    product : [s] time of the Fourier transforms of one product with the compliance operator of the
-        lattice, from `measure.plain_product`; nan without a lattice
+    product : [s] from `measure.plain_product`
     error   : max |P - P_ref| / max P_ref for loads P;  bound : proved bound on this error
     memory  : [bytes] largest increase of the memory of the process; None where unknown
     """

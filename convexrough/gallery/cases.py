@@ -229,9 +229,6 @@ def _reversals(kind: str) -> list[float]:
 class Manufactured(Record):
     """A contact made by `manufactured`, whose answer is known up to the rounding of its heights.
 
-    `cr.certify(made.scene, made.loads, approach=made.approach)` bounds the effect of this rounding
-    and proves the statuses.
-
     approach : [length] the prescribed approach
     loads    : (n,) [force] 0 where open;  gaps : (n,) [length] 0 where touching
     """
@@ -247,8 +244,8 @@ def manufactured(count: int, *, seed: int = 0, touching: float = 0.7) -> Manufac
 
     Each asperity touches with the probability `touching`. Contact radii are random from 0.1 to 0.45
     spacings, tip radii from 4 to 8 spacings, and gaps from 0 to the largest indentation. With other
-    versions of numpy, a `seed` may give other numbers. Raises InputError for a `count` below 1, or
-    if `touching` is not from 0 to 1.
+    versions of numpy, a `seed` may give other numbers. `cr.certify` bounds the effect of rounding.
+    Raises InputError for a `count` below 1, or if `touching` is not from 0 to 1.
 
     >>> made = cr.gallery.manufactured(500)
     >>> proof = cr.certify(made.scene, made.loads, approach=made.approach)

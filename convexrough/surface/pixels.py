@@ -38,11 +38,8 @@ def centres(shape: tuple[int, ...], pixel: tuple[float, float]) -> tuple[Array, 
 
 
 def hills(heights: Array) -> tuple[Indices, Array]:
-    """The pixels that are higher than all eight neighbours, the tallest first, and prominences.
-
-    Returns (n, 2) row and column, and (n,) [length] the height above the highest pass to a taller
-    maximum; of the tallest, above the lowest pixel of the map.
-    """
+    """(n, 2) row and column of the pixels that are higher than all eight neighbours, the tallest
+    first, and (n,) [length] their prominences, as in `Summits`."""
     # Pixels of equal height are ordered by position. So all maxima of a plateau but one have the
     # prominence 0, and are omitted.
     order = np.argsort(heights, axis=None, kind="stable")
@@ -150,10 +147,8 @@ def flaws(heights: Array) -> Iterator[str]:
 
 
 def filled(heights: Array) -> Array:
-    """The map with filled holes (nan): each is the mean of the pixels that share a side with it.
-
-    At least one pixel must have a height.
-    """
+    """The map, which must have a height, with filled holes (nan): each is the mean of the pixels
+    that share a side with it."""
     holes = np.isnan(heights)
     if (count := np.count_nonzero(holes)) == 0:
         return heights

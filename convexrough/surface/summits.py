@@ -196,12 +196,10 @@ class Summits(Table, Asperities, Plottable):
 def fit_tips(
     heights: Array, pixels: Indices, pixel: tuple[float, float], across: int
 ) -> tuple[NDArray[np.bool_], dict[str, Array]]:
-    """Least-squares paraboloids over `across` by `across` pixels about each maximum.
+    """Least-squares paraboloids over `across` by `across` pixels about each maximum in `pixels`,
+    rows and columns (n, 2) that are at least across // 2 from the edges of the map.
 
-    pixels : (n, 2) row and column of the maxima, at least across // 2 from the edges of the map
-
-    Returns a mask (n,), True for paraboloids that have a top within the fitted pixels; and for
-    these, the columns of `Summits` that follow from them.
+    Returns a mask (n,), True for those with a top in these pixels, and their columns of `Summits`.
     """
     reach = across // 2
     down, right = (each.ravel() for each in np.mgrid[-reach : reach + 1, -reach : reach + 1])
