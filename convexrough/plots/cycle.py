@@ -98,9 +98,8 @@ def loops_figure(
         place = x.of(loop.displacements[0] - slope * loop.forces[0]), q.of(loop.forces[0])
         look = {"fontsize": 7, "va": "center", "path_effects": style.halo()}
         style.note(upright, _range(cycle, scale), place, (4, 2), **look)
-    less = f"$X\\,/\\,{x.symbol} - \\frac{{2}}{{3}}\\,Q\\,/\\,(fP)$"
     style.label(whole, x.short("X"), q.short("Q"))
-    style.label(upright, less if x.symbol else x.short("X - Q/k"), "")
+    style.label(upright, x.short("(X - Q/k)"), "")
     upright.sharey(whole)
     upright.tick_params(labelleft=False)
     upright.set_xlim(right=upright.get_xlim()[1] + 0.22 * np.ptp(upright.get_xlim()))
@@ -116,8 +115,7 @@ def loops_figure(
         axes.xaxis.set_major_locator(style.round_ticks(4))
     handles = whole.lines[: 1 + (scale.sphere is not None)]
     style.legend(figure, "outside", handles=handles, loc="outside upper left", ncols=2)
-    elastic = "" if x.symbol else ",   $k = 3fP/(2X_0)$"
-    figure.supxlabel(f"{scale.footnote()},   $s_i$: gross slip{elastic}", fontsize=TICK)
+    figure.supxlabel(f"{scale.footnote()},   $s_i$: gross slip,   $k = 3fP/(2X_0)$", fontsize=TICK)
     return figure
 
 
