@@ -339,7 +339,7 @@ def _contact(
         state = solution.trial
         if refine := bool(solution.refine and len(problem)):
             if not is_of(state, problem, solution.loads):
-                state = refined_loads(problem, solution.loads, problem.pressed_product)
+                state = refined_loads(problem, solution.loads)
             corrected = not np.array_equal(state.loads.high, solution.loads)
             solution = replace(solution, loads=state.loads.high)
         loads = frozen(problem.to_scene(solution.loads * force))

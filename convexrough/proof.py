@@ -149,7 +149,7 @@ def _trial(scene: Scene, loads: ArrayLike, approach: float | None, load: float |
     if load is not None and not given.any():
         raise InputError("loads", found="none", expected="a load on some asperity")
     control: Any = {"approach": approach} if load is None else {"load": load, "highest": np.inf}
-    problem = NormalProblem.assemble(scene, **control, influence="dense")
+    problem = NormalProblem.assemble(scene, **control, influence="dense").sharpened()
     return trial_of(problem, given[problem.candidates] / problem.units.force)
 
 

@@ -210,7 +210,7 @@ def proved_near(problem: NormalProblem, loads: Array) -> tuple[Level, Trial]:
     given = loads[problem.candidates] / problem.units.force
     if problem.load is not None and not given.any():
         given = np.ones(len(given))
-    start = trial_of(problem, given, problem.pressed_product)
+    start = trial_of(problem, given)
     level = proved(problem, start)
     if len(problem):
         better = proved(problem, refined(problem, start))
@@ -231,12 +231,11 @@ def certificate_of(level: Level, loads: Array, start: Trial) -> Certificate:
     here = start is level.trial
     known = level.indentation if here else start.indentation
     approach = float(start.approach.value)
-    if box is None:
-        off = np.full(len(P), np.inf)
-        depths = Depths(problem, P, P, approach, np.inf, known.value, off)
+    if box is None:  # finite loads in place of `moved` give finite displacements
+        moved, shift, off = P, np.inf, np.full(len(P), np.inf)
     else:
         off = level.indentation.error if here else (level.indentation - known.value).size
-        depths = Depths(problem, P, moved, approach, shift, known.value, off * (1 + SAFETY))
+    depths = Depths(problem, P, moved, approach, shift, known.value, off * (1 + SAFETY))
     approach_error = 0.0 if problem.load is None else shift * (1 + SAFETY) * length
     if box is None:
         reason, which = level.obstacle or ("", np.zeros(0, dtype=np.intp))
@@ -309,13 +308,18 @@ class Depths:
         return whole
 
     def of_screened(self) -> tuple[Array, Array]:
-        """(m,) indentations of the asperities `screened`, and their error bounds."""
-        n, errors = self.problem.beyond(self.loads, self.approach)
-        if len(n):
-            coupling = self.problem.onto_screened
-            moved = coupling.apply(self.moved)
-            errors += self.shift + (moved + coupling.rounding(self.moved).of(moved))
-        return n, errors * (1 + SAFETY)
+        """(m,) indentations D0 + d - A P of the asperities `screened`, and their error bounds."""
+        problem, which, unit = self.problem, self.problem.screened, self.problem.units.length
+        n = self.approach + problem.scene.offsets[which] / unit
+        size = np.abs(n) + abs(self.approach)
+        errors = problem.scene.offset_errors[which] / unit
+        if len(which):
+            coupling = problem.onto_screened
+            product, moved = coupling.apply(self.loads), coupling.apply(self.moved)
+            n, size = n - product, size + np.abs(product)
+            errors += self.shift + coupling.rounding(self.loads).of(product)
+            errors += moved + coupling.rounding(self.moved).of(moved)
+        return n, (errors + 16 * ROUNDOFF * size) * (1 + SAFETY)
 
     def codes(self) -> NDArray[np.int8]:
         """(N,) the codes of statuses that follow from the indentations alone."""

@@ -152,21 +152,6 @@ class NormalProblem:
         """The map from loads to displacements of the asperities `screened`."""
         return self.influence.onto(self.scene.contact_points[self.screened])
 
-    def beyond(self, loads: Array, approach: float) -> tuple[Array, Array]:
-        """(m,) indentations D0 + d - A P of the asperities `screened`, with bounds on rounding."""
-        which, unit = self.screened, self.units.length
-        n = approach + self.scene.offsets[which] / unit
-        errors = self.scene.offset_errors[which] / unit + 16 * ROUNDOFF * (
-            np.abs(n) + abs(approach)
-        )
-        if len(which) and loads.any():
-            product = self.onto_screened.apply(loads)
-            errors += self.onto_screened.rounding(loads).of(product) + 16 * ROUNDOFF * np.abs(
-                product
-            )
-            n -= product
-        return n, errors
-
     @cached_property
     def places(self) -> Indices:
         """(N,) for each asperity of the scene its index in `candidates`, or -1."""
@@ -308,20 +293,15 @@ class NormalProblem:
         return part
 
     def widened(self, which: Indices) -> NormalProblem:
-        """The same problem with a larger set of candidates: the asperities `which` of the scene."""
+        """The sharp problem with more candidates: the asperities `which` of the scene."""
         modulus, radii = self.scene.material.contact_modulus, self.scene.relative_radii[which]
         coefficients = hertz.local_coefficient(modulus, radii)
-        return replace(self, **_about(self.scene, which, coefficients, self.units, None))
+        about = _about(self.scene, which, coefficients, self.units, None)
+        return replace(self, **about, sharp=True)
 
     def radii(self, compliance: Array) -> Array:
         """[length] contact radii a_i = 1 / (2 E* h_i) for local compliances h."""
         return np.asarray((np.pi / 2.0) * self.influence.scale / compliance)
-
-    def energy(self, loads: Array, displacement: Array) -> float:
-        """The energy Phi(P), with D0 = 0 under load control; `displacement` is A P."""
-        local = 0.6 * loads @ hertz.indentation(loads, self.coefficients)
-        prescribed = self.offsets + (self.approach or 0.0)
-        return float(local + loads @ (0.5 * displacement - prescribed))
 
     def gap(self, loads: Array, displacement: Array, approach: float) -> Array:
         """(n,) g = k P^(2/3) + A P - D, the gradient of Phi; `displacement` is A P."""

@@ -8,10 +8,9 @@ ball. A correction is one step of docs/theory/newton.md in float64.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any, TypeAlias, TypeGuard
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,9 +30,6 @@ CORRECTIONS, ENOUGH = 12, 0.1
 #: A correction leaves about a tenth of the squared residual, in scaled units, because the contact
 #: law is not linear. Where this is above the rounding error, it aims at ROUGHLY.
 ROUGHLY = 1e-6
-
-#: A function that returns A P for loads P.
-Product: TypeAlias = Callable[[Pair], Ball]
 
 #: Loads to be refined are not scaled to the total, to save time, if their sum differs from it by
 #: less than this part of the largest load.
@@ -134,9 +130,9 @@ def refined(problem: NormalProblem, best: Trial) -> Trial:
     return best
 
 
-def refined_loads(problem: NormalProblem, loads: Array, product: Product | None = None) -> Trial:
+def refined_loads(problem: NormalProblem, loads: Array) -> Trial:
     """The refined trial that starts from loads (n,) >= 0 of any solver."""
-    return refined(problem, trial_of(problem, loads, product, roughly=True))
+    return refined(problem, trial_of(problem, loads, roughly=True))
 
 
 def is_of(state: Trial | None, problem: NormalProblem, loads: Array) -> TypeGuard[Trial]:
@@ -152,15 +148,10 @@ def sharpened(problem: NormalProblem, state: Trial) -> Trial:
     return refined(problem, trial(problem, loads, missing, problem.product(loads)))
 
 
-def trial_of(
-    problem: NormalProblem, loads: Array, product: Product | None = None, *, roughly: bool = False
-) -> Trial:
-    """The trial of loads (n,) >= 0, which `completed` changes to have the prescribed total.
-
-    product : function that returns A P for loads P; default `problem.product`
-    """
+def trial_of(problem: NormalProblem, loads: Array, *, roughly: bool = False) -> Trial:
+    """The trial of loads (n,) >= 0, which `completed` changes to have the prescribed total."""
     pair, missing = completed(problem, Pair.exact(loads), roughly=roughly)
-    return trial(problem, pair, missing, (product or problem.product)(pair))
+    return trial(problem, pair, missing, problem.pressed_product(pair))
 
 
 @quietly

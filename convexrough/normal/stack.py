@@ -49,6 +49,7 @@ class Stack(NormalProblem):
             "shells": shells,
             "control": control,
             "by_load": by_load,
+            "sharp": True,
         }
         stack = cls(**given, coupled=coupled)
         stack.__dict__.update(exact=exact, squares=squares)

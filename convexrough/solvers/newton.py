@@ -22,7 +22,7 @@ from convexrough.convex.newton_step import correct
 from convexrough.errors import SolverError
 from convexrough.normal.law import Pressed, on_hertz_pressure
 from convexrough.normal.problem import NormalProblem
-from convexrough.normal.refine import Trial, refined, trial_of
+from convexrough.normal.refine import refined, trial_of
 from convexrough.roundoff import SAFETY
 from convexrough.solvers.mean_field import mean_field_indentation
 from convexrough.solvers.solution import Solution
@@ -140,17 +140,6 @@ class Newton:
 
         Raises SolverError after `max_iterations`, and if no step lowers the energy.
         """
-        loads, approach, iterations, trial = self._found(problem, start)
-        if trial is not None:  # refinement is cheap
-            trial = refined(problem, trial).frozen()
-            approach, residual = float(trial.approach.value), float(trial.excess.max())
-            return Solution(trial.loads.high, approach, iterations, residual, True, trial)
-        return Solution.of(problem, loads, approach, iterations, refine=self.tolerance <= 0)
-
-    def _found(
-        self, problem: NormalProblem, start: Array | None
-    ) -> tuple[Array, float, int, Trial | None]:
-        """Loads, approach, number of steps, and the trial to be refined, if there is one."""
         indentation = _start(problem, start)
         near, iterations = np.arange(len(problem)), 0
         refines = problem.influence.cheap_sums and not self.tolerance > 0
@@ -166,21 +155,22 @@ class Newton:
             loads = among_zeros(state.forces, near, len(problem))
             unknown, approach = state.unknown, float(state.at.approach)
             del state  # saves memory
-            product, trial = problem.pressed_product, None
-            if refines:
-                trial = trial_of(problem, loads, product, roughly=True)
+            trial = trial_of(problem, loads, roughly=True) if refines else None
             if len(near) == len(problem):
-                return loads, approach, iterations, trial
+                break
             # The iteration left out some asperities: compute the gaps of all.
             gap = trial.gap.value if trial else problem.gap(loads, problem.apply(loads), approach)
             touched = gap < 0
             touched[near] = False
             if not touched.any():
-                return loads, approach, iterations, trial
+                break
             indentation = -gap
             indentation[near] = unknown
             touched[near] = True  # `near` only grows, so the loop ends
             near = np.flatnonzero(touched | (indentation > -margin))
+        if trial is not None:
+            return Solution.of_trial(refined(problem, trial), iterations)
+        return Solution.of(problem, loads, approach, iterations, refine=self.tolerance <= 0)
 
     def _iterate(
         self, problem: NormalProblem, near: Indices, indentation: Array, early: bool

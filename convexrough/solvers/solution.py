@@ -78,6 +78,12 @@ class Solution(Record):
         return cls(loads, approach, iterations, residual, refine)
 
     @classmethod
+    def of_trial(cls, state: Trial, iterations: int) -> Solution:
+        """The solution with the loads of a refined trial."""
+        approach, residual = float(state.approach.value), float(state.excess.max())
+        return cls(state.loads.high, approach, iterations, residual, True, state.frozen())
+
+    @classmethod
     def refined(
         cls, problem: NormalProblem, loads: Array, iterations: int, solver: str
     ) -> Solution:
@@ -86,19 +92,17 @@ class Solution(Record):
         `CORRECTED` allows: else any answer would be right.
         """
         start = loads if loads.any() else np.ones(len(loads))
-        state = refined_loads(problem, start, problem.pressed_product)
-        approach, residual = float(state.approach.value), float(state.excess.max())
-        missed = residual / (abs(approach) + float(np.abs(problem.offsets).max()))
+        step = cls.of_trial(refined_loads(problem, start), iterations)
+        missed = step.residual / (abs(step.approach) + float(np.abs(problem.offsets).max()))
         if not missed <= ACCURATE:
             raise SolverError(
                 f"residual of {missed:.3g} of the approach after Newton steps, at most "
                 f"{ACCURATE:g} accepted",
                 solver=solver,
                 advice="try more iterations, a smaller tolerance, or Newton's method",
-                iterate=state.loads.high,
+                iterate=step.loads,
             )
-        found = state.loads.high
-        changed, largest = float(np.abs(found - loads).max()), float(found.max())
+        changed, largest = float(np.abs(step.loads - loads).max()), float(step.loads.max())
         if not changed <= CORRECTED * largest + TINY:
             raise SolverError(
                 f"Newton steps changed loads of up to {largest:.3g} by {changed:.3g}, at most "
@@ -107,7 +111,7 @@ class Solution(Record):
                 advice="try more iterations, a smaller tolerance, or Newton's method",
                 iterate=loads,
             )
-        return cls(found, approach, iterations, residual, True, state.frozen())
+        return step
 
 
 class Solver(Protocol):
