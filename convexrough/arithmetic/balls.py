@@ -11,7 +11,8 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, TypeAlias
+from functools import partial
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,9 @@ Exact: TypeAlias = "float | int | Fraction | Array | Pair"
 
 #: Elementwise function of midpoints and radii that returns a midpoint and a radius.
 Elementwise: TypeAlias = "Callable[..., tuple[Pair, Array]]"
+
+#: Arrays, pairs or balls.
+Stacked = TypeVar("Stacked")
 
 quietly = np.errstate(all="ignore")
 
@@ -77,12 +81,6 @@ class Ball:
         """Balls that contain all numbers from `low` to `high`."""
         middle = low / 2.0 + high / 2.0
         return cls.around(middle, np.maximum(high - middle, middle - low) * UP + TINY)
-
-    @classmethod
-    def stacked(cls, balls: list[Ball]) -> Ball:
-        """Balls of the same shape, stacked along a new first axis."""
-        mids = (np.stack(parts) for parts in zip(*(ball.mid for ball in balls), strict=True))
-        return cls(Pair(*mids), np.stack([ball.radius for ball in balls]))
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -202,8 +200,8 @@ class Ball:
 
 def where(condition: NDArray[np.bool_], yes: Ball, no: Ball) -> Ball:
     """Elements of `yes` where the condition is True, else of `no`, as in numpy.where."""
-    high, low = (np.where(condition, a, b) for a, b in zip(yes.mid, no.mid, strict=True))
-    return Ball(Pair(high, low), np.where(condition, yes.radius, no.radius))
+    chosen: Ball = of_rows(partial(np.where, condition), yes, no)
+    return chosen
 
 
 def of_rows(function: Callable[..., Any], *values: Any) -> Any:
@@ -220,6 +218,12 @@ def of_rows(function: Callable[..., Any], *values: Any) -> Any:
 def joined(balls: Sequence[Ball]) -> Ball:
     """The balls concatenated along the first axis."""
     joint: Ball = of_rows(lambda *each: np.concatenate(each), *balls)
+    return joint
+
+
+def stacked(values: Sequence[Stacked]) -> Stacked:
+    """Arrays, pairs or balls of one shape, stacked along a new first axis."""
+    joint: Stacked = of_rows(lambda *each: np.stack(each), *values)
     return joint
 
 

@@ -105,13 +105,13 @@ def solve(
         state, before = following, size
     if state.residual <= max(tolerance, accurate) * state.scale:
         return state, most
-    raise SolverError(
-        f"residual {_relative(state):.3g} of {law.unit} after {most} steps, "
-        f"at most {max(tolerance, accurate):.3g} needed",
-        solver=law.solver,
-        advice=law.advice(state),
-        iterate=state.forces,
-    )
+    what = f"residual {_relative(state):.3g} of {law.unit} after {most} steps"
+    raise _failed(law, state, f"{what}, at most {max(tolerance, accurate):.3g} needed")
+
+
+def _failed(law: Law, state: Iterate, what: str) -> SolverError:
+    advice = law.advice(state)
+    return SolverError(what, solver=law.solver, advice=advice, iterate=state.forces)
 
 
 def _relative(state: Iterate) -> float:
@@ -128,9 +128,4 @@ def descend(law: Law, state: Iterate, direction: Array) -> Iterate:
             if trial.energy - state.energy <= PROMISED * min(slope, 0.0) + state.rounding:
                 return trial
         length /= 2.0
-    raise SolverError(
-        "no step in the computed direction lowers the energy",
-        solver=law.solver,
-        advice=law.advice(state),
-        iterate=state.forces,
-    )
+    raise _failed(law, state, "no step in the computed direction lowers the energy")

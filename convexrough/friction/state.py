@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough import threads
-from convexrough.arithmetic.balls import Ball, joined, of_rows, where
+from convexrough.arithmetic.balls import Ball, joined, of_rows, stacked, where
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.friction.curve import MemoryCurve, Piece
 from convexrough.friction.levels import FrictionLevels, exactly, rounded
@@ -73,7 +73,7 @@ class LevelSums(NamedTuple):
 
 def displacements_of(levels: FrictionLevels, sums: LevelSums) -> Ball:
     """(m,) [length] the displacement X of each curve."""
-    approaches = Ball.stacked([levels.at(load).approach for load in sums.used])
+    approaches = stacked([levels.at(load).approach for load in sums.used])
     return sums.total(approaches) * levels.travel_unit
 
 
@@ -84,8 +84,8 @@ def states_of(
     sums = LevelSums.of(curves)
     levels.prepare(sums.used)
     solved, travel = [levels.at(load) for load in sums.used], levels.travel_unit
-    loads = Ball.stacked([level.loads[which] for level in solved])
-    moved = Ball.stacked([level.indentation[which] for level in solved])
+    loads = stacked([level.loads[which] for level in solved])
+    moved = stacked([level.indentation[which] for level in solved])
     return States(
         displacements_of(levels, sums),
         sums.total(loads) * levels.force_unit,
@@ -155,7 +155,7 @@ def losses(levels: FrictionLevels, costs: Sequence[Sequence[Piece]]) -> Ball:
     integrals = fallen[np.argsort(np.argsort(~still, kind="stable"))]  # of -dB/dL
     found = exactly([1 - p.sign * p.slope for p in pieces]) * integrals
     ends = np.cumsum([0, *map(len, costs)]).tolist()
-    return Ball.stacked([found[start:stop].sum() for start, stop in pairwise(ends)])
+    return stacked([found[start:stop].sum() for start, stop in pairwise(ends)])
 
 
 def _at_constant_load(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
@@ -189,7 +189,7 @@ def front_integrals(levels: FrictionLevels, pieces: Sequence[Piece]) -> Ball:
     )
     loads = sorted({load for end in ends for load in end})
     known, place = [levels.at(load) for load in loads], {x: k for k, x in enumerate(loads)}
-    every, approach = energies(known), Ball.stacked([level.approach for level in known])
+    every, approach = energies(known), stacked([level.approach for level in known])
     which = [[place[load] for load in end] for end in ends]
     (V0, V1, V2, V3), (D0, D1, D2, D3) = ([x[k] for k in which] for x in (every, approach))
     stiffness = np.array([_stiffest(known[k]) for k in which[1]])

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough import checks
-from convexrough.arithmetic.balls import Ball
+from convexrough.arithmetic.balls import Ball, stacked
 from convexrough.arrays import Array, Indices, frozen
 from convexrough.errors import InputError
 from convexrough.friction.curve import MemoryCurve, Piece, Point
@@ -119,7 +119,7 @@ class Walk:
         if self.general is not None:
             return self.general.losses, unknown
         each = losses(self.levels, self.pieces)
-        since_start = Ball.stacked([*accumulate(each[k] for k in range(len(each)))])
+        since_start = stacked([*accumulate(each[k] for k in range(len(each)))])
         spent, errors = rounded(since_start * self.levels.loss_unit)
         return spent, errors if self.order == "proved" else unknown
 

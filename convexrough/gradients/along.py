@@ -19,7 +19,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.arithmetic.balls import Ball
+from convexrough.arithmetic.balls import Ball, stacked
 from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array
 from convexrough.errors import InputError
@@ -217,7 +217,7 @@ class Along:
                 near, fine, values[k] = past[k].mean(), found[k], past[k]
                 known = Ball.around(near, float(fine.error) + abs(float(fine.value) - near))
                 found[k] = NONE if tied[k] or np.isnan(fine.value) else known
-        return Ball.stacked(found), values
+        return stacked(found), values
 
 
 def _one(below: Ball, above: Ball) -> Ball:

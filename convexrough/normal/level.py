@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.arithmetic.balls import Ball, of_rows, where
+from convexrough.arithmetic.balls import Ball, of_rows, stacked, where
 from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices, among_zeros, summed
 from convexrough.convex.newton_step import correct
@@ -62,9 +62,7 @@ class Springs(NamedTuple):
 
     def at(self, which: Indices) -> Springs:
         """The springs of some asperities."""
-        touching, doubtful, slopes, compliance, h, margin = self
-        some = touching[which], doubtful[which], slopes[which], compliance[which], h[which]
-        return Springs(*some, margin)
+        return Springs._make((*(each[which] for each in self[:-1]), self.margin))
 
 
 class Obstacle(NamedTuple):
@@ -283,13 +281,7 @@ class Level:
 
 
 def _bounded(
-    problem: NormalProblem,
-    springs: Springs,
-    x: Pair,
-    left: Ball,
-    beta: Ball,
-    total: Ball,
-    j: int,
+    problem: NormalProblem, springs: Springs, x: Pair, left: Ball, beta: Ball, total: Ball, j: int
 ) -> tuple[Ball, Ball]:
     """Balls of the solution near x and `beta`, whose residual is `left`.
 
@@ -342,15 +334,7 @@ class Rows(NamedTuple):
 def rows_of(levels: Sequence[Level]) -> Rows:
     """Levels of one scene as arrays with one row for each level."""
     names = "load", "approach", "loads", "indentation", "touching", "open"
-    return Rows._make(_stacked(levels, name) for name in names)
-
-
-def _stacked(each: Sequence[Any], name: str) -> Any:
-    """The attributes of this name as arrays, pairs or balls with one row for each object."""
-    values = [getattr(it, name) for it in each]
-    if isinstance(values[0], Ball):
-        return Ball.stacked(values)
-    return of_rows(lambda *rows: np.stack(rows), *values)
+    return Rows._make(stacked([getattr(level, name) for level in levels]) for name in names)
 
 
 @np.errstate(invalid="ignore")  # nan occurs only for levels that are not proved
@@ -360,9 +344,9 @@ def energies(levels: Sequence[Level]) -> Ball:
     which = [k for k, level in enumerate(levels) if level.trial is not None]
     if which:
         loaded = [levels[k] for k in which]
-        states = [level.trial for level in loaded]
+        names, states = ("loads", "gap", "product", "missing"), [it.trial for it in loaded]
         trial, gap, product, missing = (
-            _stacked(states, name) for name in ("loads", "gap", "product", "missing")
+            stacked([getattr(state, name) for state in states]) for name in names
         )
         data = loaded[0].problem.exact
         local = data.coefficients * Ball.exact(trial).two_thirds()
@@ -370,7 +354,7 @@ def energies(levels: Sequence[Level]) -> Ball:
         found = Ball.exact(trial).dot(per_load)
         # The energy of trial loads P exceeds the least energy at their total by at most the sum of
         # e_i |P_i - P*_i|, for the solution P* and e = `excess`.
-        off = (Ball.exact(trial) - _stacked(loaded, "loads")).size
+        off = (Ball.exact(trial) - stacked([level.loads for level in loaded])).size
         above = (excess(gap, trial.high > 0) * off).sum(axis=-1) * (1 + SAFETY)
         uncertainty = np.array([float(level.load.radius) for level in loaded])
         rate = np.array([float(level.approach.size) for level in loaded])

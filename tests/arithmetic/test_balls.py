@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from multiprecision import middle
 
-from convexrough.arithmetic.balls import Ball, residual
+from convexrough.arithmetic.balls import Ball, residual, stacked
 from convexrough.arithmetic.pairs import CHUNK, Pair, two_sum
 
 #: Bits that hold sums and products of any float64 numbers.
@@ -135,7 +135,7 @@ def test_sums_of_products(rows: Any, seed: int) -> None:
     """`sum` and `dot` along the last axis, also of nothing."""
     x = balls(rows) if rows else balls([(0.0, 0.0, 0.0)])[:0]
     y = x[np.random.default_rng(seed).permutation(len(x))]
-    one, two = x.sum(), Ball.stacked([x * y, x]).sum()
+    one, two = x.sum(), stacked([x * y, x]).sum()
     for k in range(5):
         a, b = ([samples(z, i)[k] for i in range(len(z))] for z in (x, y))
         assert holds(one[None], 0, sum(a, arb(0)))
