@@ -224,9 +224,6 @@ class LatticeInfluence(coupling.Influence):
         errors = np.stack([pull.error + moved for pull in pulls], axis=1)
         return Ball.around(-self.scale * values, self.scale * (errors + 8 * ROUNDOFF * abs(values)))
 
-    def _pulls(self, box: SiteBox) -> list[Kernel]:
-        return self._on(box, "pulls", lambda: box.pulls(coupling.cubed))
-
     def separations(self) -> Array:
         if len(self) <= FILLED * math.prod(self.box.shape):
             return super().separations()
@@ -349,7 +346,7 @@ class LatticeInfluence(coupling.Influence):
         if most + unknown == 0.0 or top == 0.0:
             return Ball.exact(np.zeros(len(self)))
         shares = loads / top
-        pulls = self._pulls(box)
+        pulls = self._on(box, "pulls", lambda: box.pulls(coupling.cubed))
 
         def pull(waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
             along, across = (1j * kernel.spectrum[:, each] for kernel in pulls)

@@ -102,7 +102,19 @@ class BristleProgram:
     def assemble(cls, problem: NormalProblem, m: int, solver: str) -> BristleProgram:
         n = len(problem)
         checks.fits_in_memory("asperities of the bristle program", n, 60 * n + 1000 * m)
-        return cls(problem, m, solver, *_convex_box(problem))
+        trial = hertz.load(on_hertz_pressure(problem), problem.coefficients)
+        approach_bound = problem.overhang(trial, problem.plain_product(Pair.exact(trial)))
+        with np.errstate(divide="ignore"):  # a single asperity has no shell and no face
+            faces = (2.0 / 3.0 * problem.coefficients * LARGEST_S / problem.shells) ** 3
+        whole = problem.bounds(approach_bound)
+        whole = np.maximum(whole, np.minimum(faces, SMALLEST_BOX * whole.max()))
+        root = np.sqrt(1.0 / problem.compliance(whole))
+        matrix = problem.influence.matrix
+        scaled = matrix * root * root[:, None]
+        np.fill_diagonal(scaled, 1.0 - MARGIN)
+        box = whole if is_definite(scaled) else np.minimum(whole, faces)
+        hessian = matrix + np.diag(problem.compliance(box))
+        return cls(problem, m, solver, box, box < whole, hessian)
 
     def apply(self) -> QuadraticProgram:
         """The program, with constraints phi_ij >= 0, sum_j e_ij / m = 0, and the given load."""
@@ -154,18 +166,3 @@ class BristleProgram:
         if len(beyond := np.flatnonzero(self.cut & (loads >= self.box))):
             ratios = problem.shells[beyond] / problem.compliance(loads[beyond], beyond)
             raise TooDenseError(self.solver, problem.candidates[beyond], ratios, LARGEST_S)
-
-
-def _convex_box(problem: NormalProblem) -> tuple[Array, NDArray[np.bool_], Array]:
-    """The upper ends B (n,); a mask (n,), True where B was cut; and the matrix A + diag(h)."""
-    trial = hertz.load(on_hertz_pressure(problem), problem.coefficients)
-    approach_bound = problem.overhang(trial, problem.plain_product(Pair.exact(trial)))
-    with np.errstate(divide="ignore"):  # a single asperity has no shell and no face
-        faces = (2.0 / 3.0 * problem.coefficients * LARGEST_S / problem.shells) ** 3
-    whole = problem.bounds(approach_bound)
-    whole = np.maximum(whole, np.minimum(faces, SMALLEST_BOX * whole.max()))
-    root = np.sqrt(1.0 / problem.compliance(whole))
-    scaled = problem.influence.matrix * root * root[:, None]
-    np.fill_diagonal(scaled, 1.0 - MARGIN)
-    box = whole if is_definite(scaled) else np.minimum(whole, faces)
-    return box, box < whole, problem.influence.matrix + np.diag(problem.compliance(box))
