@@ -17,7 +17,7 @@ instead, with the unknown W y.
 from __future__ import annotations
 
 from contextlib import nullcontext
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +49,15 @@ LEAST_SLOPE = 2.0**-500
 Values = NDArray[Any]  # of single or double precision
 
 
+class _System(NamedTuple):
+    """The matrix I + W (A + diag(shells)) W, and whether the loads must keep their sum."""
+
+    influence: Influence
+    shells: Array | None  # None for 0
+    root: Array  # (n,) the diagonal of W
+    balanced: bool
+
+
 def correct(
     influence: Influence,
     shells: Array,
@@ -74,27 +83,22 @@ def correct(
         return -defect
     direct = len(touching) <= (FACTORISED if influence.stored else FACTORISED_UNSTORED)
     for extra in (None, shells):
+        system = _System(influence, extra, root, balanced)
         if direct:
-            step = _factorise(influence, extra, touching, root, defect, balanced)
+            step = _factorise(system, touching, defect)
         else:
             with threads.one_thread() if not influence.stored else nullcontext():
-                step = _in_two_parts(influence, extra, root, defect, balanced, tolerance)
+                step = _in_two_parts(system, defect, tolerance)
         if step is not None:
             return step
     raise SolverError("the matrix of a step is not positive definite", solver="newton")
 
 
-def _factorise(
-    influence: Influence,
-    shells: Array | None,
-    touching: Indices,
-    root: Array,
-    defect: Array,
-    balanced: bool,
-) -> Array | None:
+def _factorise(system: _System, touching: Indices, defect: Array) -> Array | None:
     """The step by Cholesky's factorisation; None if the matrix is not positive definite."""
     from scipy.linalg.lapack import dpotrf, dpotrs  # 0.2 s to import: only when solving
 
+    influence, shells, root, balanced = system
     matrix, softness = influence.submatrix(touching), softness_of(root[touching] ** 2)
     matrix.ravel()[:: len(matrix) + 1] = softness if shells is None else softness + shells[touching]
     # The symmetric matrix equals its transpose, which has LAPACK's order: no copy.
@@ -115,17 +119,11 @@ def softness_of(slopes: Array) -> Array:
     return np.asarray(1.0 / np.maximum(slopes, LEAST_SLOPE))
 
 
-def _in_two_parts(
-    influence: Influence,
-    shells: Array | None,
-    root: Array,
-    defect: Array,
-    balanced: bool,
-    tolerance: float,
-) -> Array | None:
+def _in_two_parts(system: _System, defect: Array, tolerance: float) -> Array | None:
     """The step by `_iterate`; in two parts only where single precision is not enough."""
+    influence, shells, root, balanced = system
     smooth = influence.smoother(root)
-    step = _iterate(influence, smooth, shells, root, defect, balanced, tolerance)
+    step = _iterate(system, smooth, defect, tolerance)
     if step is None or shells is not None or influence.stored or TWICE * tolerance > SINGLE_LIMIT:
         return step
     slopes = root**2
@@ -137,19 +135,12 @@ def _in_two_parts(
     if size == 0.0 or not left.any():
         return step
     share = float(np.linalg.norm(left)) / size
-    rest = _iterate(influence, smooth, None, root, left, balanced, tolerance / share, missing)
+    rest = _iterate(system, smooth, left, tolerance / share, missing)
     return None if rest is None else step + rest
 
 
 def _iterate(
-    influence: Influence,
-    smooth: Smoother | None,
-    shells: Array | None,
-    root: Array,
-    defect: Array,
-    balanced: bool,
-    tolerance: float,
-    total: float = 0.0,
+    system: _System, smooth: Smoother | None, defect: Array, tolerance: float, total: float = 0.0
 ) -> Array | None:
     """The step by preconditioned conjugate gradients (docs/theory/newton.md, "Many asperities");
     None if the matrix is not positive definite.
@@ -159,6 +150,7 @@ def _iterate(
     factor times the diagonal of W to the residual, so that single precision is enough. The sum of
     these factors is beta of the step, divided by the scale of the defect.
     """
+    influence, shells, root, balanced = system
     single = not influence.stored
     dtype: Any = np.float32 if single else np.float64
     limit = SINGLE_LIMIT if single else DOUBLE_LIMIT

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar
@@ -12,7 +11,7 @@ import numpy as np
 from convexrough.arrays import Array, Indices
 from convexrough.influence import coupling
 from convexrough.influence.sliced_matrix import MatrixSums
-from convexrough.roundoff import ROUNDOFF, SAFETY
+from convexrough.roundoff import ROUNDOFF
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,13 +60,6 @@ class DenseInfluence(coupling.Influence):
             raised = raised * inverse
         loss = 1.01 * ((len(self) + 6) * ROUNDOFF + power * self.entry_error)
         return np.asarray((raised @ strengths) * (1.0 + loss))
-
-    @property
-    def row_norm(self) -> float:
-        entries = self.entries / (top := float(self.entries.max(initial=0.0)) or 1.0)
-        squares = np.einsum("ij,ij->i", entries, entries)
-        error = 1.0 + SAFETY + self.entry_error + len(self) * ROUNDOFF
-        return top * math.sqrt(squares.max(initial=0.0)) * error
 
     def submatrix(self, which: Indices) -> Array:
         return self.entries.take(which, axis=0).take(which, axis=1)
