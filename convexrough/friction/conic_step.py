@@ -8,7 +8,6 @@ from convexrough.arrays import Array, Indices
 from convexrough.convex.cones import FIVE_CONES_LIMIT, FOUR_CONES_LIMIT, power_cones
 from convexrough.errors import SolverError
 from convexrough.friction.general_step import OwnStep, Step, Stepper
-from convexrough.influence.shells import shells
 from convexrough.solvers.programs import ConeProgram, run_clarabel
 
 TOLERANCE = 1e-11  # of the solver Clarabel
@@ -46,7 +45,7 @@ class ConicStepper(Stepper):
         from scipy import sparse  # 0.1 s to import: only when solving
 
         n, N, own, parts = len(which), *(it[which] for it in (step.loads, step.own, step.parts))
-        wells = shells(self.influence.restricted(which))
+        wells = self.influence.restricted(which).shells
         shifts = wells * N * parts / own  # `wells` in the units of the pieces
         if 1.5 * shifts.max(initial=0.0) > FIVE_CONES_LIMIT:
             what, advice = "asperities too dense for a convex program", 'use solver="newton"'

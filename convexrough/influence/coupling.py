@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from convexrough import checks, threads
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair
-from convexrough.arrays import Array, Indices
+from convexrough.arrays import Array, Indices, evenly
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene import neighbours
 
@@ -165,6 +165,30 @@ class Influence(Coupling):
     def crowding(self, radii: Array) -> float:
         """The largest (a_i + a_j) / r_ij; the `radii` a (n,) are contact radii, 0 where open."""
         return neighbours.crowding(self.points, radii)
+
+    @property
+    def shells(self) -> Array:
+        """(n,) 1 / (pi E* s_i), where s_i is half the distance to the nearest neighbour.
+
+        It is 0 for a single asperity, and infinite for points that may coincide. Spheres of radii
+        s_i about the asperities (shells) do not overlap, so A + diag(1 / (pi E* s_i)) is positive
+        semidefinite: docs/theory/convexity.md, "Why (2) is not convex as it stands".
+        """
+        with np.errstate(divide="ignore"):
+            return evenly(lambda apart: 2.0 * self.scale / apart, self.separations())
+
+    def fitted_shells(self, radii: Array, share: float) -> Array:
+        """(n,) 1 / (pi E* s_i) for shells adapted to contact radii a_i = `radii`.
+
+        s_i = share a_i / c + (1 - share) d_i / 2, where c is the largest (a_i + a_j) / r_ij, and
+        d_i the distance to the nearest neighbour: docs/theory/certificate.md, "Choice of the box".
+        """
+        crowding = self.crowding(radii) * (1.0 + SAFETY + 2.0 * self.entry_error)
+        s = (1.0 - share) * self.separations() / 2.0
+        if 0 < crowding < np.inf:
+            s = s + share * (radii / crowding)
+        with np.errstate(divide="ignore"):
+            return np.asarray(self.scale / s)
 
     def semidefinite_with(self, radius: float) -> bool:
         """True if A + (scale / radius) I is proved positive semidefinite: only on a lattice."""

@@ -30,7 +30,6 @@ from convexrough.convex.definite import largest, proved_margin, proved_sparse_ma
 from convexrough.convex.newton_step import correct
 from convexrough.errors import SolverError
 from convexrough.influence.coupling import Influence
-from convexrough.influence.shells import fitted_shells
 from convexrough.normal.problem import NormalProblem, convexity_number
 from convexrough.roundoff import ROUNDOFF, SAFETY
 
@@ -140,7 +139,7 @@ def tried(problem: NormalProblem, loads: Array, displacement: Ball) -> Box | Non
     shells, h = problem.shells, problem.compliance(loads)
     theta = convexity_number(shells, h)
     if theta > FIT_FROM:
-        fitted = fitted_shells(problem.influence, problem.radii(h), FITTED)
+        fitted = problem.influence.fitted_shells(problem.radii(h), FITTED)
         if (number := convexity_number(fitted, h)) < theta:
             shells, theta = fitted, number
     if not theta < 1:
@@ -183,7 +182,7 @@ def box_of_touching(
     box = np.where(touching, loads + np.maximum(least, room), 0.0)
     h = problem.compliance(box)
     own, shells = h[which], np.zeros(len(h))
-    shells[which] = fitted_shells(influence, problem.radii(own), FITTED)
+    shells[which] = influence.fitted_shells(problem.radii(own), FITTED)
     number = convexity_number(shells, h)
     if not number < 1:
         if influence.stored or len(which) <= FACTORISED:

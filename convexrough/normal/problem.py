@@ -31,7 +31,6 @@ from convexrough.influence import Influence, Kind, couple
 from convexrough.influence.coupling import Coupling
 from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.lattice import LatticeInfluence
-from convexrough.influence.shells import shells
 from convexrough.influence.sliced_matrix import MatrixSums
 from convexrough.normal.exact import Data, Units, exact_data
 from convexrough.normal.load_control import approach_bound, highest_approach
@@ -359,7 +358,7 @@ def _about(
         "offsets": scene.offsets[which] / units.length,
         "offset_errors": scene.offset_errors[which] / units.length,
         "influence": influence,
-        "shells": shells(influence),
+        "shells": influence.shells,
     }
 
 

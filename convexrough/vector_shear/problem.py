@@ -32,7 +32,6 @@ from convexrough.convex.definite import proved_margin
 from convexrough.errors import InputError
 from convexrough.friction.levels import FrictionLevels
 from convexrough.influence import Influence
-from convexrough.influence.shells import shells
 from convexrough.normal.boxes import Scope
 from convexrough.roundoff import ROUNDOFF, SAFETY, SUM_ROUNDOFFS
 from convexrough.sphere import mindlin
@@ -130,7 +129,7 @@ class FrictionProblem:
     @property
     def convexity_numbers(self) -> Array:
         """(n,) contact radii divided by pi/4 times the distance to the nearest loaded asperity."""
-        return np.asarray(shells(self.influence) / self.compliance)
+        return np.asarray(self.influence.shells / self.compliance)
 
     @property
     def elastic(self) -> Ball:

@@ -32,7 +32,6 @@ from convexrough.influence.dense import DenseInfluence
 from convexrough.influence.lattice import LatticeInfluence
 from convexrough.influence.pair_sums import Product
 from convexrough.influence.scattered import ScatteredInfluence
-from convexrough.influence.shells import fitted_shells, shells
 from convexrough.influence.softened import Softened
 from convexrough.influence.splitting import Splitting
 from convexrough.normal.certificate import certify_on
@@ -154,7 +153,7 @@ def test_steps_of_more_digits_than_single_precision_has(balanced: bool) -> None:
     A = couple(scene, np.arange(len(scene)), SCALE)
     c = random.uniform(0.02, 0.2, len(scene)) * scene.asperities.lattice.spacing / SCALE
     defect = random.normal(size=len(scene))
-    step = correct(A, shells(A), np.sqrt(c), defect, balanced=balanced, tolerance=1e-10)
+    step = correct(A, A.shells, np.sqrt(c), defect, balanced=balanced, tolerance=1e-10)
     left = step + A.apply(c * step) + defect
     if balanced:
         assert abs(c @ step) <= 1e-11 * np.abs(c * step).sum()
@@ -311,7 +310,7 @@ def test_shells_do_not_overlap(seed: int) -> None:
     dense, mesh = DenseInfluence.assemble(points, SCALE), ScatteredInfluence(points, SCALE)
     for A in (scenes.lattice_operator(points, SCALE), mesh, dense):
         with np.errstate(divide="ignore"):
-            fitted, halves = SCALE / fitted_shells(A, radii, share), SCALE / shells(A)
+            fitted, halves = SCALE / A.fitted_shells(radii, share), SCALE / A.shells
         for s in (fitted, halves):
             assert ((s[:, None] + s) * inverse).max() <= 1 + 4 * ROUNDOFF, A.name
 
@@ -445,7 +444,7 @@ def test_shell_lemma(seed: int, count: int, shape: float) -> None:
     rng = np.random.default_rng(seed)
     points = rng.standard_normal((count, 2)) * np.abs(rng.standard_normal((count, 1))) ** shape
     matrix = inverse_distances(points, points)
-    shifted = matrix + np.diag(shells(DenseInfluence.assemble(points, 1.0)))
+    shifted = matrix + np.diag(DenseInfluence.assemble(points, 1.0).shells)
     eigenvalues = np.linalg.eigvalsh(shifted)
     assert eigenvalues[0] >= -1e-13 * eigenvalues[-1]
     assert np.linalg.eigvalsh(matrix)[0] < 0  # so the shift is needed
