@@ -19,12 +19,12 @@ from convexrough.cached import Cached
 from convexrough.errors import InputError, ProofError, SolverError
 from convexrough.influence import Influence, Kind
 from convexrough.influence.choice import couple
-from convexrough.normal.certificate import MOST_KEPT, Certificate, certificate_of, certify_on
+from convexrough.normal.certificate import MOST_KEPT, Certificate, certificate_of, proved_near
 from convexrough.normal.level import Level
 from convexrough.normal.levels import Levels
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.proved import proved
-from convexrough.normal.refine import Trial, is_of, refined_loads, sharpened
+from convexrough.normal.refine import Trial, is_of, refined_loads
 from convexrough.plottable import Plottable
 from convexrough.progress import LOGGER
 from convexrough.record import Along, Table
@@ -294,7 +294,7 @@ def levels_of(contact: Contact) -> Levels:
     assert state is not None
     if not top.problem.precise:
         problem = top.problem.sharpened()
-        state = sharpened(problem, state)
+        state = refined_loads(problem, state.loads)
         top = proved(problem, state, top.box)
     loads = state.loads.high
 
@@ -348,10 +348,10 @@ def _contact(
         if refine:
             assert state is not None
             level = proved(problem, state)
-            certificate = certificate_of(level, loads, state)
             top = level if len(problem) <= MOST_KEPT[problem.influence.name] else None
         else:
-            certificate = certify_on(problem, loads)
+            level, state = proved_near(problem, loads)
+        certificate = certificate_of(level, loads, state)
     said = isinstance(solver, solvers.Newton) or solver.name.endswith("Newton step")
     contact = Contact(
         scene=scene,

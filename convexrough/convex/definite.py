@@ -73,12 +73,7 @@ def proved_sparse_margin(
         bounds on their errors
     margins  : in increasing order
 
-    1. Elimination without exchange of rows gives L and U with S = L U + E and
-       |E| <= g / (1 - g) |L| |U|, where g = n u with the roundoff u (Higham, Accuracy and
-       Stability, theorem 9.3).
-    2. Let D, the diagonal of U, be positive. Then L D L' is positive definite. The difference
-       S - L D L' = E + L (U - D L') is symmetric, so its norm is at most e, the largest row sum of
-       its absolute values. Therefore S >= -e I.
+    docs/theory/crowded.md, "Shells that overlap", explains the proof by Gaussian elimination.
     """
     from scipy.sparse import coo_array
 
@@ -98,7 +93,12 @@ def proved_sparse_margin(
 
 
 def _elimination_slack(matrix: Any) -> float:
-    """A number e for which  matrix >= -e I  is proved; infinite if the elimination fails."""
+    """A number e for which  matrix >= -e I  is proved; infinite if the elimination fails.
+
+    With the factors L and U, and the diagonal D > 0 of U, e is the largest row sum of a bound on
+    |matrix - L D L'|. The elimination has an error of at most n u / (1 - n u) |L| |U|, where u is
+    the roundoff (Higham, Accuracy and Stability, theorem 9.3).
+    """
     from scipy.sparse import diags_array
     from scipy.sparse.linalg import splu
 

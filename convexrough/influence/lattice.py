@@ -1,10 +1,8 @@
 """The compliance operator of points on a lattice: a convolution, computed by Fourier transforms.
 
-The operator maps loads P_j to displacements sum_j A_ij P_j with A_ij = scale / r_ij and A_ii = 0,
-where r_ij is the distance between contact points. The smallest box of sites that holds the
-asperities is padded with enough zeros that periodic images do not contribute. The padded box is at
-most about twice as large in each direction. docs/theory/operators-lattice.md explains the method,
-its rounding errors and the products with more digits ("sharp" products).
+The smallest box of sites that holds the asperities is padded with enough zeros that periodic images
+do not contribute, to about twice its size in each direction, or less. "Sharp" products have more
+digits. docs/theory/operators-lattice.md explains the method and its rounding errors.
 """
 
 from __future__ import annotations

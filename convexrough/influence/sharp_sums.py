@@ -1,11 +1,10 @@
 """The sums over pairs of `pair_sums`, with more digits than float64 has, for certificates.
 
-The kernel 1 / r is the sum of a smooth part L and a rest S, which is 0 for distant pairs. For loads
-P, the part of the sums with L is W G W^T P, where W interpolates from the nodes of a mesh to the
-points, and G has the values of L between nodes. So there are three products: from points to the
-mesh, on the mesh, and back to the points. For each, numbers are split into a first slice and a
-rest. First slices have so few bits that sums of their products are exact, and all products with
-rests are small. The table at the end of docs/theory/operators-mesh.md shows which errors remain.
+With the symbols of `pair_sums`, the smooth part L of the kernel adds W G W^T P to the sums for
+loads P. These are three products: from points to the mesh, on the mesh, and back to the points. For
+each, numbers are split into a first slice, with so few bits that sums of products of first slices
+are exact, and a small rest. The table at the end of docs/theory/operators-mesh.md shows which
+errors remain.
 """
 
 from __future__ import annotations

@@ -6,13 +6,9 @@ is the local compliance at the upper ends of a box (`NormalProblem.compliance`),
 matrix of the h, and A the compliance operator. On the box the Hessian of the energy is at least
 mu H, with the margin mu = 1 - `convexity_number`.
 
-If contacts are crowded, overlapping shells about the asperities may prove the convexity
-(docs/theory/crowded.md, "Shells that overlap"). With the lengths t_i = 1 / (pi E* h_i), distances
-r_ij, any radii s_i, and the energy U_ij of two shells of charge 1 with these radii, the matrix
-
-    S_ii = 1 - t_i / s_i,    S_ij = (t_i t_j)^(1/2) (1 / r_ij - U_ij)  for i != j,
-
-is sparse, and  H^(-1/2) (H + A) H^(-1/2) >= S.
+Overlapping shells about the asperities may prove the convexity then: "Shells that overlap" there
+defines their sparse matrix S, and the energy U_ij of two shells. The lengths are t_i = 1 / (pi E*
+h_i), and the distances r_ij.
 """
 
 from __future__ import annotations

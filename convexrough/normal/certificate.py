@@ -196,13 +196,8 @@ def certify(
     checks.instance("scene", scene, Scene)
     values = checks.array("loads", loads, length=len(scene), sign="not negative")
     problem = NormalProblem.assemble(scene, approach=approach, load=load, influence=influence)
-    return certify_on(problem, values)
-
-
-def certify_on(problem: NormalProblem, loads: Array) -> Certificate:
-    """The certificate of the given `loads` (N,) [force] of all asperities of `problem.scene`."""
-    level, start = proved_near(problem, loads)
-    return certificate_of(level, loads, start)
+    level, start = proved_near(problem, values)
+    return certificate_of(level, values, start)
 
 
 def proved_near(problem: NormalProblem, loads: Array) -> tuple[Level, Trial]:

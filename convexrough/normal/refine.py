@@ -130,8 +130,8 @@ def refined(problem: NormalProblem, best: Trial) -> Trial:
     return best
 
 
-def refined_loads(problem: NormalProblem, loads: Array) -> Trial:
-    """The refined trial that starts from loads (n,) >= 0 of any solver."""
+def refined_loads(problem: NormalProblem, loads: Array | Pair) -> Trial:
+    """The refined trial that starts from loads (n,) >= 0 of any solver, or of another trial."""
     return refined(problem, trial_of(problem, loads, roughly=True))
 
 
@@ -142,15 +142,10 @@ def is_of(state: Trial | None, problem: NormalProblem, loads: Array) -> TypeGuar
     )
 
 
-def sharpened(problem: NormalProblem, state: Trial) -> Trial:
-    """The refined trial that starts from the loads of another trial, with all their digits."""
-    loads, missing = completed(problem, state.loads, roughly=True)
-    return refined(problem, trial(problem, loads, missing, problem.product(loads)))
-
-
-def trial_of(problem: NormalProblem, loads: Array, *, roughly: bool = False) -> Trial:
+def trial_of(problem: NormalProblem, loads: Array | Pair, *, roughly: bool = False) -> Trial:
     """The trial of loads (n,) >= 0, which `completed` changes to have the prescribed total."""
-    pair, missing = completed(problem, Pair.exact(loads), roughly=roughly)
+    pair = loads if isinstance(loads, Pair) else Pair.exact(loads)
+    pair, missing = completed(problem, pair, roughly=roughly)
     return trial(problem, pair, missing, problem.pressed_product(pair))
 
 

@@ -40,17 +40,9 @@ OWN_SHARE = 1.10
 def mean_field_indentation(problem: NormalProblem) -> Array:
     """(n,) initial indentations in scaled units, negative where open.
 
-    If the rings lead to no solution, the result is that of `on_hertz_pressure`.
+    If the rings lead to no solution, because contacts are too crowded, the result is that of
+    `on_hertz_pressure`.
     """
-    try:
-        start = _mean_field(problem)
-    except np.linalg.LinAlgError:
-        start = None
-    return on_hertz_pressure(problem) if start is None else start
-
-
-def _mean_field(problem: NormalProblem) -> Array | None:
-    """The result of `mean_field_indentation` from the rings; None if they lead to no solution."""
     count = max(4, min(RINGS, len(problem) // LEAST))
     # Rings of equal area: sphere and displacement are nearly linear in the squared distance.
     squares = problem.scene.asperities.distances[problem.candidates] ** 2  # not kept in memory
@@ -100,11 +92,14 @@ def _mean_field(problem: NormalProblem) -> Array | None:
             # The change of the approach is one more unknown, the load one more equation.
             system = np.block([[system, -(K @ c)[:, None]], [-c[None, :], c.sum()]])
             right = np.append(right, problem.load - float(P.sum()))
-        step = np.linalg.solve(system, right)
+        try:
+            step = np.linalg.solve(system, right)
+        except np.linalg.LinAlgError:
+            break
         w, approach = w + step[:count], approach + float(step[count:].sum())
         if np.abs(step).max() < ENOUGH * abs(approach):  # False for nan
             return np.asarray(approach + problem.offsets - between(w, places))
-    return None  # contacts are too crowded
+    return on_hertz_pressure(problem)
 
 
 def _disc(distance: Array, radius: Array) -> Array:

@@ -34,7 +34,7 @@ from convexrough.influence.pair_sums import Product
 from convexrough.influence.scattered import ScatteredInfluence
 from convexrough.influence.softened import Softened
 from convexrough.influence.splitting import Splitting
-from convexrough.normal.certificate import certify_on
+from convexrough.normal.certificate import certificate_of, proved_near
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.refine import trial
 from convexrough.roundoff import ROUNDOFF
@@ -374,7 +374,9 @@ def test_gaps_on_a_mesh_and_what_they_prove(geometry: Any) -> None:
     loads = Newton().solve(problem).loads
     assert_gaps_known(problem, loads, limit=2e-14 * problem.approach)
     force = problem.units.force
-    certificate = certify_on(problem, problem.to_scene(loads) * force)
+    given = problem.to_scene(loads) * force
+    level, start = proved_near(problem, given)
+    certificate = certificate_of(level, given, start)
     assert certificate.scope == "local"
     assert certificate.load_error < 1e-11 * loads.max() * force
 
