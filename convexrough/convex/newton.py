@@ -91,11 +91,9 @@ def solve(
         near = state.residual <= accurate * state.scale
         size = math.sqrt(np.vdot(state.defect, state.defect))
         done = state.residual <= max(tolerance * state.scale, 0.0)
-        if done or (near and size <= state.noise):
+        if done or (near and size <= state.noise) or size <= linear:
             return state, step - 1
         expected = (size / before) ** 2 if before < np.inf else 1.0
-        if size <= linear:
-            return state, step - 1
         forcing = min(MOST_LEFT, expected)
         enough = max(state.noise / size, tolerance * state.scale / state.residual)
         direction = law.direction(state, max(forcing, OVERSOLVED * enough))

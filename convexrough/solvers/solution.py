@@ -94,24 +94,17 @@ class Solution(Record):
         start = loads if loads.any() else np.ones(len(loads))
         step = cls.of_trial(refined_loads(problem, start), iterations)
         missed = step.residual / (abs(step.approach) + float(np.abs(problem.offsets).max()))
-        if not missed <= ACCURATE:
-            raise SolverError(
-                f"residual of {missed:.3g} of the approach after Newton steps, at most "
-                f"{ACCURATE:g} accepted",
-                solver=solver,
-                advice="try more iterations, a smaller tolerance, or Newton's method",
-                iterate=step.loads,
-            )
         changed, largest = float(np.abs(step.loads - loads).max()), float(step.loads.max())
-        if not changed <= CORRECTED * largest + TINY:
-            raise SolverError(
-                f"Newton steps changed loads of up to {largest:.3g} by {changed:.3g}, at most "
-                f"{CORRECTED:g} of the largest accepted",
-                solver=solver,
-                advice="try more iterations, a smaller tolerance, or Newton's method",
-                iterate=loads,
-            )
-        return step
+        if not missed <= ACCURATE:
+            what = f"residual of {missed:.3g} of the approach after Newton steps"
+            what, iterate = f"{what}, at most {ACCURATE:g} accepted", step.loads
+        elif not changed <= CORRECTED * largest + TINY:
+            what = f"Newton steps changed loads of up to {largest:.3g} by {changed:.3g}"
+            what, iterate = f"{what}, at most {CORRECTED:g} of the largest accepted", loads
+        else:
+            return step
+        advice = "try more iterations, a smaller tolerance, or Newton's method"
+        raise SolverError(what, solver=solver, advice=advice, iterate=iterate)
 
 
 class Solver(Protocol):
