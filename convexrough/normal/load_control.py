@@ -13,7 +13,6 @@ from convexrough.arrays import Array, Indices, even, evenly, largest, summed, ta
 from convexrough.errors import InputError
 from convexrough.influence import Kind, couple
 from convexrough.influence.choice import FEW_ASPERITIES
-from convexrough.influence.coupling import Coupling
 from convexrough.roundoff import ROUNDOFF, SAFETY
 from convexrough.scene.base import along
 from convexrough.scene.layout import MANY
@@ -217,13 +216,13 @@ def _bound_within(reach: float, scene: Scene, load: float, influence: Kind | Non
             weights[which] = fitting
     coefficients = hertz.local_coefficient(modulus, radii)
     weights = np.sqrt(weights / coefficients) / coefficients  # dP/dL if all rise alike
-    couplings: list[tuple[Indices, Coupling]] = [(which, sources)]
+    displacement = np.empty(len(near))
+    displacement[which] = sources.falloff(weights[which], 1)
     if not every:
         others = np.flatnonzero(weights == 0)
-        couplings.append((others, sources.onto(scene.contact_points[near[others]])))
-    displacement = np.empty(len(near))
-    for index, coupling in couplings:
-        displacement[index] = coupling.falloff(weights[which], 1) * (sources.scale * (1 + SAFETY))
+        onto = sources.onto(scene.contact_points[near[others]])
+        displacement[others] = onto.falloff(weights[which], 1)
+    displacement *= sources.scale * (1 + SAFETY)
     if far.any():
         loaded = np.flatnonzero(weights)
         apart = distances[far].min() * (1 - SAFETY) - distances[near[loaded]]

@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from convexrough.arithmetic.balls import Ball, elementwise, of_rows, where
-from convexrough.arithmetic.pairs import Pair
+from convexrough.arithmetic.balls import Ball, of_rows, where
 from convexrough.arrays import Array, summed
 from convexrough.convex.theorem import distance
 from convexrough.normal.boxes import Box, box_of_touching, crowded, tried
@@ -97,8 +96,7 @@ def solution_in(problem: NormalProblem, box: Box, state: Trial) -> tuple[Any, Ar
     indentation = Ball.around(known.mid, known.radius + (moved + shift))
     opened = indentation.negative
     loads = Ball.around(state.loads, np.where(opened, state.loads.high, errors))  # open: 0
-    if (loads.radius > POOR * loads.mid.high).any():
-        loads = elementwise(_or_by_law, loads, indentation, problem.exact.coefficients)
+    loads = _or_by_law(loads, indentation, problem.exact.coefficients)
     approach = Ball.around(state.approach.mid, shift)
     found = Level(problem, loads, indentation, approach, opened, state, box, within, h)
     return inside, at_first, found
@@ -120,24 +118,21 @@ def _missing(problem: NormalProblem, state: Trial) -> tuple[Any, Any, Any]:
     return part * loads, part * coupled, np.where(part <= 0.5, part * rest, np.inf)
 
 
-def _or_by_law(P: Pair, dP: Array, n: Pair, dn: Array, k: Pair, dk: Array) -> tuple[Pair, Array]:
-    """The balls of loads P, or of (n / k)^(3/2) where P is inexact and this ball is smaller.
-
-    n : the indentations;  dP, dn, dk : radii of the balls
-    """
+def _or_by_law(P: Ball, n: Ball, k: Ball) -> Ball:
+    """The loads P, or (n / k)^(3/2) with indentations n where P is inexact and this is a smaller
+    ball."""
+    which = P.radius > POOR * P.value
+    if not which.any():
+        return P
     # Where n is known well, the ball of (n / k)^(3/2) has a radius of about 1.5 P dn / n.
-    hopeless = (n.high > 2.0 * dn) & (1.5 * P.high * dn > dP * n.high)
-    which = ((dP > POOR * P.high) & ~hopeless).nonzero()
-
-    def some(ball: Ball) -> Ball:
-        found: Ball = of_rows(lambda part: np.broadcast_to(part, dP.shape)[which], ball)
-        return found
-
-    ratio, found = some(Ball(n, dn)) / some(Ball(k, dk)), of_rows(np.copy, Ball(P, dP))
+    which &= ~((n.value > 2.0 * n.radius) & (1.5 * P.value * n.radius > P.radius * n.value))
+    k = of_rows(lambda part: np.broadcast_to(part, which.shape), k)
+    ratio, given = n[which] / k[which], P[which]
     by_law = ratio.positive_part() * ratio.sqrt()
-    best = where(by_law.radius < dP[which], by_law, some(found))
+    best = where(by_law.radius < given.radius, by_law, given)
+    found: Ball = of_rows(np.copy, P)
     found.mid.high[which], found.mid.low[which], found.radius[which] = *best.mid, best.radius
-    return found.mid, found.radius
+    return found
 
 
 def _approach_error(
