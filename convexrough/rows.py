@@ -137,8 +137,8 @@ def _proved(
     """Press the scenes of one stack, in the units of the first problem; those that are proved."""
     first, places = every[0][0], np.array([k for _, k in every])
     n, units = len(first), first.units
-    coupled, offsets, known = list[tuple[slice, NormalProblem]](), list[Ball](), list[Ball]()
-    shelled, start = np.empty((len(every), n)), 0
+    start, coupled = 0, list[tuple[slice, NormalProblem]]()
+    offsets, known = list[Ball](), list[Ball]()
     for _, group in groupby(every, key=lambda each: id(each[0])):
         family = list(group)
         problem, m = family[0][0], len(family)
@@ -146,13 +146,11 @@ def _proved(
         offsets.append(_offsets(problem, [scenes[k] for _, k in family]))
         repeated = partial(np.broadcast_to, shape=(m, n))
         known.append(of_rows(repeated, problem.exact.coefficients))
-        shelled[start : start + m] = problem.shells
         start += m
     unit = units.force if by_load else units.length
     given = Ball.exact(controls[places][:, None]).scaled(1.0 / unit)
     exact = Data(joined(known), joined(offsets), first.exact.scale)
-    squares = np.array([scenes[k].asperities.distances for k in places]) ** 2
-    rows = Stack.of(coupled, exact, shelled, squares, given, by_load)
+    rows = Stack.of(coupled, exact, given, by_load)
     level, proved = solved(rows)
     good = np.flatnonzero(proved)
     if not len(good) or level.box is None:

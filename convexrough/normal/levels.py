@@ -88,12 +88,12 @@ class Levels:
         if not able or self.top.box is None:
             return [None] * len(loads)
         levels, closed = list[Level | None](), self.top.box.closed(problem)
-        fixed = problem.exact, problem.shells, problem.squares
         for some in threads.chunks(len(loads), max(1, NUMBERS // len(problem))):
             totals = loads[some]
             LOGGER.info(f"normal problems {some.start + 1:,} to {some.stop:,} of {len(loads):,}")
             rows = [(slice(0, len(totals)), problem)]
-            level, good = solved(Stack.of(rows, *fixed, totals[:, None], by_load=True), closed)
+            stack = Stack.of(rows, problem.exact, totals[:, None], by_load=True)
+            level, good = solved(stack, closed)
             for k in range(len(totals)):
                 levels.append(level.row(k, problem.at_load(totals[k])) if good[k] else None)
         self._known |= {_key(level.load): level for level in levels if level is not None}

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -19,26 +19,19 @@ from convexrough.convex.newton_step import softness_of
 from convexrough.normal.exact import Data
 from convexrough.normal.problem import NormalProblem
 
+#: Slices of rows, each with a problem that has the compliance operator of these rows.
+Coupled: TypeAlias = Sequence[tuple[slice, NormalProblem]]
+
 
 @dataclass(frozen=True, eq=False)
 class Stack(NormalProblem):
     """Problems in m rows: arrays are (m, n), or (n,) where all rows are equal. `restricted`,
     `widened`, `approach_bound`, `places`, `to_scene` and `assemble` do not work."""
 
-    #: slices of the rows, each with a problem that has the compliance operator of these rows; scene
-    #: and units are those of the first problem
-    coupled: Sequence[tuple[slice, NormalProblem]]
+    coupled: Coupled  # scene and units are those of the first problem
 
     @classmethod
-    def of(
-        cls,
-        coupled: Sequence[tuple[slice, NormalProblem]],
-        exact: Data,
-        shells: Array,
-        squares: Array,
-        control: Ball,
-        by_load: bool,
-    ) -> Stack:
+    def of(cls, coupled: Coupled, exact: Data, control: Ball, by_load: bool) -> Stack:
         """The stack of these problems; `exact` has coefficients (1,) or (m, 1), offsets (m, n)."""
         first = coupled[0][1]
         given = {each.name: getattr(first, each.name) for each in fields(first)} | {
@@ -46,27 +39,22 @@ class Stack(NormalProblem):
             "offsets": exact.offsets.value,
             "offset_errors": exact.offsets.error,
             "highest": np.full(control.shape, np.inf) if by_load else control.upper,
-            "shells": shells,
+            "shells": _each(coupled, "shells"),
             "control": control,
             "by_load": by_load,
             "sharp": True,
         }
         stack = cls(**given, coupled=coupled)
-        stack.__dict__.update(exact=exact, squares=squares)
+        stack.__dict__.update(exact=exact, squares=_each(coupled, "squares"))
         return stack
 
     @cached_property
     def row_norm(self) -> Array:
-        return self._each("row_norm")
+        return _each(self.coupled, "row_norm")[:, None]
 
     @cached_property
     def largest_entry(self) -> Array:
-        return self._each("largest_entry")
-
-    def _each(self, name: str) -> Array:
-        """(m, 1) this property of the problem of each row."""
-        counts = [rows.stop - rows.start for rows, _ in self.coupled]
-        return np.repeat([getattr(each, name) for _, each in self.coupled], counts)[:, None]
+        return _each(self.coupled, "largest_entry")[:, None]
 
     def only(self, rows: Indices) -> Stack:
         """The stack of the chosen rows, given in increasing order."""
@@ -79,9 +67,8 @@ class Stack(NormalProblem):
 
         k, d, scale = self.exact
         coupled = [(some, problem) for some, (_, problem) in slices if some.stop > some.start]
-        shells, squares, control = map(pick, (self.shells, self.squares, self.control))
         data = Data(pick(k), pick(d), scale)
-        return Stack.of(coupled, data, shells, squares, control, self.by_load)
+        return Stack.of(coupled, data, pick(self.control), self.by_load)
 
     def apply(self, loads: Array) -> Array:
         """(m, n) A P in float64."""
@@ -123,3 +110,9 @@ class Stack(NormalProblem):
         shift = summed(moved) / summed(border) if self.by_load else 0.0
         np.put_along_axis(changes, order, moved - shift * border, axis=1)
         return np.asarray(np.where(todo[:, None], shift - defect + self.apply(changes), 0.0))
+
+
+def _each(coupled: Coupled, name: str) -> Array:
+    """(m, ...) this property of the problem of each row."""
+    counts = [rows.stop - rows.start for rows, _ in coupled]
+    return np.repeat([getattr(problem, name) for _, problem in coupled], counts, axis=0)
