@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from convexrough import threads
 from convexrough.arithmetic.balls import Ball
-from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair, in_parts, two_product, two_sum
+from convexrough.arithmetic.pairs import CHUNK, PAIR_ROUNDOFF, Pair, in_parts, two_product, two_sum
 from convexrough.arrays import Array, Indices, even
 from convexrough.influence import coupling
 from convexrough.influence.convolution import Kernel, SiteBox, through_waves
@@ -35,9 +35,6 @@ Made = TypeVar("Made")
 #: Bound on the relative error, in roundoffs, of a computed scale / |i b1 + j b2|, where b1, b2 is a
 #: reduced basis of the lattice.
 ENTRY_ROUNDOFFS = 24
-
-#: Number of array elements in a block, chosen to fit into a processor's cache.
-CHUNK = 2**14
 
 #: Fraction of occupied sites of a box up to which a k-d tree finds neighbours. A heuristic: it
 #: affects speed, and the lower bounds on nearest distances, from which shells are computed
