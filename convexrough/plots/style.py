@@ -105,11 +105,10 @@ def round_ticks(most: int = 5, *, whole: bool = False) -> MaxNLocator:
 
 
 def few_ticks(axes: Axes) -> None:
-    """At most 6 ticks along each axis; each tick is measured several times when it is drawn.
-
-    The locators stay the default ones, which names of categories or another scale replace.
-    """
-    axes.locator_params(nbins=5, steps=[1, 2, 5, 10])
+    """At most 6 ticks along each axis; each tick is measured several times when it is drawn."""
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(round_ticks())
+        axis.isDefault_majloc = True  # names of categories replace it
 
 
 def log_ticks(axis: Axis, most: int = 6) -> None:

@@ -1,7 +1,8 @@
 """`smooth`: closed forms of the smooth sphere, for comparison with a rough contact.
 
 It is the scene's sphere, pressed with the same load on a plane without asperities. Displacements
-and losses are sums over both bodies; Dini and Hills (2009), equations 12 to 16, give those of one.
+and losses are sums over both bodies. Source: Johnson, Contact Mechanics (1985), chapters 4 and 7;
+and Dini and Hills (2009), equations 12 to 16, for one of the bodies.
 """
 
 from __future__ import annotations
