@@ -10,6 +10,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
+import scipy  # its parts are imported when they are used
 from numpy.typing import ArrayLike, NDArray
 
 from convexrough import checks, solvers
@@ -427,10 +428,9 @@ def covered(scene: Scene, radii: Array) -> int:
     nearest = 0.0 if scene.lattice is None else scene.lattice.spacing
     if len(discs) == 0 or len(summits) == 0 or float(radii.max()) < 0.99 * nearest:
         return 0
-    from scipy.spatial import cKDTree  # takes 0.1 s to import
 
     points = scene.contact_points
-    under = cKDTree(points[summits]).query_ball_point(points[discs], radii[discs])
+    under = scipy.spatial.cKDTree(points[summits]).query_ball_point(points[discs], radii[discs])
     return len({int(i) for each in under for i in each})
 
 

@@ -11,6 +11,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+import scipy  # its parts are imported when they are used
 
 from convexrough.arrays import Array
 from convexrough.bench.rows import Row
@@ -179,19 +180,17 @@ def plain_product(scene: Scene) -> float:
 
     They are scipy's, in float64 on all cores, on a grid twice as wide and high as the lattice.
     """
-    from scipy import fft
-
     if scene.asperities.layout.sites is None:
         return math.nan
     shape = np.ptp(scene.asperities.layout.sites, axis=0) + 1
-    size = [fft.next_fast_len(2 * int(length) - 1, real=True) for length in shape]
+    size = [scipy.fft.next_fast_len(2 * int(length) - 1, real=True) for length in shape]
     field, spectrum = np.ones(shape), np.ones((size[0], size[1] // 2 + 1))
 
     def product() -> float:
         began = time.perf_counter()
-        waves = fft.rfft2(field, size, workers=cores())
+        waves = scipy.fft.rfft2(field, size, workers=cores())
         waves *= spectrum
-        fft.irfft2(waves, size, workers=cores())
+        scipy.fft.irfft2(waves, size, workers=cores())
         return time.perf_counter() - began
 
     product()

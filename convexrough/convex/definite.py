@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+import scipy  # its parts are imported when they are used
 
 from convexrough.arrays import Array, Indices
 from convexrough.roundoff import ROUNDOFF
@@ -31,10 +32,8 @@ def largest(margins: Sequence[float], proved: Callable[[float], bool]) -> float:
 
 def is_definite(matrix: Array) -> bool:
     """True if Cholesky's factorisation of a symmetric matrix succeeds; by itself no proof."""
-    from scipy.linalg.lapack import dpotrf  # 0.2 s to import: only when asked
-
     # The transpose of a symmetric matrix is equal to it and has LAPACK's memory order.
-    factor, failed = dpotrf(matrix.T, lower=1, clean=0)
+    factor, failed = scipy.linalg.lapack.dpotrf(matrix.T, lower=1, clean=0)
     return not failed and bool(np.isfinite(factor.diagonal()).all())
 
 
@@ -75,8 +74,6 @@ def proved_sparse_margin(
 
     docs/theory/crowded.md, "Shells that overlap", explains the proof by Gaussian elimination.
     """
-    from scipy.sparse import coo_array
-
     n = len(diagonal)
     (i, j), every = pairs, np.arange(n)
     perturbation = np.bincount(i, errors, n) + np.bincount(j, errors, n)
@@ -86,7 +83,7 @@ def proved_sparse_margin(
     def proved(margin: float) -> bool:
         # 0.01 mu covers the errors of the elimination.
         entries = np.concatenate((diagonal - 1.01 * margin - off, values, values))
-        slack = _elimination_slack(coo_array((entries, where), shape=(n, n)).tocsc())
+        slack = _elimination_slack(scipy.sparse.coo_array((entries, where), shape=(n, n)).tocsc())
         return 1.1 * slack < 0.01 * margin
 
     return largest(margins, proved)
@@ -99,18 +96,17 @@ def _elimination_slack(matrix: Any) -> float:
     |matrix - L D L'|. The elimination has an error of at most n u / (1 - n u) |L| |U|, where u is
     the roundoff (Higham, Accuracy and Stability, theorem 9.3).
     """
-    from scipy.sparse import diags_array
-    from scipy.sparse.linalg import splu
-
     n, options = matrix.shape[0], {"SymmetricMode": True, "Equil": False}
     try:
-        found = splu(matrix, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+        found = scipy.sparse.linalg.splu(
+            matrix, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options
+        )
     except RuntimeError:  # exactly singular
         return np.inf
     D, ones = found.U.diagonal(), np.ones(n)
     if not ((found.perm_r == found.perm_c).all() and (D > 0).all()):
         return np.inf
-    L, U, scaled = abs(found.L), abs(found.U), diags_array(D) @ found.L.T
+    L, U, scaled = abs(found.L), abs(found.U), scipy.sparse.diags_array(D) @ found.L.T
     rounding = n * ROUNDOFF / (1.0 - n * ROUNDOFF)
     beyond = abs(found.U - scaled) @ ones + 2 * ROUNDOFF * (U @ ones + abs(scaled) @ ones)
     slack = float((L @ (rounding * (U @ ones) + beyond)).max())

@@ -20,6 +20,7 @@ from contextlib import nullcontext
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy  # its parts are imported when they are used
 from numpy.typing import NDArray
 
 from convexrough import threads
@@ -96,19 +97,17 @@ def correct(
 
 def _factorise(system: _System, touching: Indices, defect: Array) -> Array | None:
     """The step by Cholesky's factorisation; None if the matrix is not positive definite."""
-    from scipy.linalg.lapack import dpotrf, dpotrs  # 0.2 s to import: only when solving
-
     influence, shells, root, balanced = system
     matrix, softness = influence.submatrix(touching), softness_of(root[touching] ** 2)
     matrix.ravel()[:: len(matrix) + 1] = softness if shells is None else softness + shells[touching]
     # The symmetric matrix equals its transpose, which has LAPACK's order: no copy.
-    factor, info = dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)
+    factor, info = scipy.linalg.lapack.dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)
     if info != 0:
         return None
-    x = dpotrs(factor, defect[touching], lower=1)[0]
+    x = scipy.linalg.lapack.dpotrs(factor, defect[touching], lower=1)[0]
     shift = 0.0
     if balanced:
-        border = dpotrs(factor, np.ones(len(x)), lower=1, overwrite_b=1)[0]
+        border = scipy.linalg.lapack.dpotrs(factor, np.ones(len(x)), lower=1, overwrite_b=1)[0]
         shift = float(x.sum()) / float(border.sum())
         x -= shift * border
     return shift - defect + influence.apply(among_zeros(x, touching, len(root)))

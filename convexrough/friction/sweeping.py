@@ -21,6 +21,7 @@ from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
+import scipy  # its parts are imported when they are used
 from numpy.typing import NDArray
 
 from convexrough import threads
@@ -124,12 +125,10 @@ class _Swept:
     @cached_property
     def hull(self) -> NDArray[np.complex128]:
         """Points whose convex hull contains the support, up to 1e-9 of `extent`."""
-        from scipy.spatial import ConvexHull, QhullError  # 0.1 s to import: only when asked
-
         points = self.places[self.support]
         try:
-            return np.asarray(points[ConvexHull(self.plane.T[self.support]).vertices])
-        except QhullError:  # all on a line
+            return np.asarray(points[scipy.spatial.ConvexHull(self.plane.T[self.support]).vertices])
+        except scipy.spatial.QhullError:  # all on a line
             return np.asarray(points)
 
     @cached_property
@@ -145,9 +144,7 @@ class _Swept:
 
     @cached_property
     def _tree(self) -> Any:
-        from scipy.spatial import cKDTree
-
-        return cKDTree(self.influence.points[self.support])
+        return scipy.spatial.cKDTree(self.influence.points[self.support])
 
     def neighbours(self, which: Indices, count: int) -> Indices:
         """(m, count) the nearest asperities on the support to each asperity, without itself."""
@@ -257,15 +254,13 @@ class _Swept:
 
     def lightest(self, which: Indices, near: Indices) -> Array:
         """(m, s) weights of the neighbours `near` with the least q_i at a sample of asperities."""
-        from scipy.optimize import linprog
-
         weights = np.zeros(near.shape)
         sample = self.support[:: -(-len(self.support) // SAMPLE)]
         for k, closest in enumerate(self.neighbours(which, SAMPLE)):
             i = which[k : k + 1]
             seen = np.setdiff1d(np.concatenate((near[k], closest, sample)), i)
             ratios = self.potentials(near[k][:, None], seen) * self.apart(i, seen)
-            found = linprog(np.ones(len(near[k])), -ratios.T, -np.ones(len(seen)))
+            found = scipy.optimize.linprog(np.ones(len(near[k])), -ratios.T, -np.ones(len(seen)))
             if found.status == 0 and found.x is not None:
                 own = np.maximum(found.x, 0.0)  # solvers return some below 0
                 weights[k] = own / own.sum()
@@ -297,11 +292,9 @@ class _Swept:
 
     def _everywhere(self, which: Indices, near: Indices, weights: Array) -> tuple[Array, Indices]:
         """(m,) the least q_i of (7) for the whole support, and the k that determine it."""
-        from scipy.sparse import csr_array
-
         charged, columns = np.unique(near, return_inverse=True)
         starts, shape = np.arange(len(which) + 1) * near.shape[1], (len(which), len(charged))
-        charges = csr_array((weights.ravel(), columns.ravel(), starts), shape=shape)
+        charges = scipy.sparse.csr_array((weights.ravel(), columns.ravel(), starts), shape=shape)
         least, worst = np.full(len(which), np.inf), which.copy()
         parts = 1 + (len(charged) + len(which)) * len(self.support) // NUMBERS
         for seen in np.array_split(self.support, parts) if len(which) else ():

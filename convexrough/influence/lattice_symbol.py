@@ -15,6 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy  # its parts are imported when they are used
 
 from convexrough.arrays import Array
 
@@ -96,12 +97,10 @@ class _Symbol:
         For the other bound, each cosine is replaced by -1, and each |k + G| by an upper bound,
         because E decreases.
         """
-        from scipy.special import erfc
-
         g1, g2 = self.dual
         rho = size / 2.0 * max(np.hypot(*(g1 + g2)), np.hypot(*(g1 - g2)))
         own = 2.0 * self.alpha / np.sqrt(np.pi)
-        weights = erfc(self.alpha * self.distances) / self.distances
+        weights = scipy.special.erfc(self.alpha * self.distances) / self.distances
         waves = cells @ self.dual
         phases = waves @ self.sites.T
         away = waves[:, None] + self.images
@@ -119,10 +118,8 @@ class _Symbol:
 
     def _image(self, q: Array) -> tuple[Array, Array]:
         """(2 pi / V) E(q), and minus the derivative of this with respect to q."""
-        from scipy.special import erfc
-
         share, x = 2.0 * np.pi / self.area, q / (2.0 * self.alpha)
-        value = share * erfc(x) / q
+        value = share * scipy.special.erfc(x) / q
         gauss = share / (np.sqrt(np.pi) * self.alpha) * np.exp(-x * x)
         return value, (value + gauss) / q
 

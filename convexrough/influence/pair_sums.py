@@ -15,6 +15,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+import scipy  # its parts are imported when they are used
 from numpy.typing import NDArray
 
 from convexrough import checks, threads
@@ -141,17 +142,14 @@ class NearPairs:
 
     @classmethod
     def assemble(cls, mesh: Mesh) -> NearPairs:
-        from scipy.sparse import coo_array
-        from scipy.spatial import cKDTree
-
         points, splitting = mesh.points, mesh.splitting
-        n, tree = len(points), cKDTree(points)
+        n, tree = len(points), scipy.spatial.cKDTree(points)
         some = points[:: max(1, n // SAMPLE)]
         near = np.sum(tree.query_ball_point(some, splitting.cut, return_length=True))
         checks.fits_in_memory("asperities that could touch", n, BYTES * near / max(len(some), 1))
         pairs = tree.query_pairs(splitting.cut, output_type="ndarray")
         places = tuple(np.ascontiguousarray(each, dtype=np.int32) for each in pairs.T)
-        ones = coo_array((np.ones(len(pairs), dtype=mesh.dtype), places), shape=(n, n))
+        ones = scipy.sparse.coo_array((np.ones(len(pairs), dtype=mesh.dtype), places), shape=(n, n))
         ones.has_canonical_format = True  # no pair occurs twice, so rows need not be sorted
         del pairs, places  # saves memory
         upper, nearest = ones.tocsr(), [splitting.cut]

@@ -17,6 +17,7 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy  # its parts are imported when they are used
 
 from convexrough import threads
 from convexrough.arithmetic.balls import Ball
@@ -101,8 +102,6 @@ class SharpPairs:
     """
 
     def __init__(self, product: Product) -> None:
-        from scipy.sparse import csr_array
-
         upper, mesh, terms = product.near.upper, product.mesh, max(product.near.terms, 1)
         self.product = product
         self.sums, _ = _sizes(product, np.ones(len(mesh.points)))  # bounds on row sums of |S|
@@ -133,7 +132,7 @@ class SharpPairs:
 
         threads.each(cut, row_parts(upper, CHUNK), threads.worthwhile(len(first)))
         self.first, self.second = (
-            csr_array((part, upper.indices, upper.indptr), shape=upper.shape)
+            scipy.sparse.csr_array((part, upper.indices, upper.indptr), shape=upper.shape)
             for part in (first, second)
         )
 

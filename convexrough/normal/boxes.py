@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
+import scipy  # its parts are imported when they are used
 from numpy.typing import NDArray
 
 from convexrough.arithmetic.balls import Ball
@@ -240,12 +241,10 @@ def overlapping_margin(influence: Influence, lengths: Array, margins: Sequence[f
 def nearest(points: Array, lengths: Array) -> tuple[Array, Indices, Array]:
     """(n, m) distances to the m nearest neighbours, (n, m) indices of these neighbours, and (n,)
     the largest (t_i t_j)^(1/2) / r_ij with one of them, for t = `lengths`."""
-    from scipy.spatial import cKDTree  # takes 0.1 s to import
-
     if len(points) < 2:
         none = np.zeros((len(points), 0))
         return none, none.astype(np.intp), np.zeros(len(points))
-    found = cKDTree(points).query(points, k=min(len(points), NEAREST + 1))
+    found = scipy.spatial.cKDTree(points).query(points, k=min(len(points), NEAREST + 1))
     distances, which = (np.asarray(each)[:, 1:] for each in found)
     closest = (np.sqrt(lengths[:, None] * lengths[which]) / distances).max(axis=1)
     return distances, which, closest
@@ -256,9 +255,7 @@ def overlaps(
 ) -> tuple[tuple[Indices, Indices], Array, Array] | None:
     """All pairs i, j of asperities whose shells overlap, the entries S_ij, and the numbers
     (t_i t_j)^(1/2) / r_ij; None if there may be too many pairs to store."""
-    from scipy.spatial import cKDTree
-
-    tree = cKDTree(points)
+    tree = scipy.spatial.cKDTree(points)
     usual = WIDE * float(np.median(radii)) if len(radii) else 0.0
     wide = np.flatnonzero(radii > usual)  # searched one by one
     reach = radii[wide] + float(radii.max(initial=0.0))

@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
+import scipy  # its parts are imported when they are used
 from numpy.typing import NDArray
 
 from convexrough import checks
@@ -157,10 +158,8 @@ class Claim(ABC):
 
     def _moved(self, values: Array, true: Array) -> str:
         """The symmetries of the array (axes, signs, turns) that correct forces; "" if none."""
-        from scipy.spatial import cKDTree  # takes 0.1 s to import
-
         points = self.of.asperities.positions
-        tree, size, found = cKDTree(points), float(np.abs(points).max()), list[str]()
+        tree, size, found = scipy.spatial.cKDTree(points), float(np.abs(points).max()), list[str]()
         for said, moved in (
             ("x and y exchanged", points[:, ::-1]),
             ("the other sign of x", points * [-1, 1]),

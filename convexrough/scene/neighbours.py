@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import chain
 
 import numpy as np
+import scipy  # its parts are imported when they are used
 
 from convexrough.arrays import Array
 from convexrough.checks import SIZED, SMALLEST
@@ -16,11 +17,9 @@ FEW = 400
 
 def crowding(points: Array, radii: Array) -> float:
     """The largest (a_i + a_j) / r_ij over all pairs, with contact radii a and distances r."""
-    from scipy.spatial import cKDTree
-
     if len(points) < 2:
         return 0.0
-    tree = cKDTree(points)
+    tree = scipy.spatial.cKDTree(points)
     found = tree.query(points, k=2)
     distances, nearest = (np.asarray(each)[:, 1] for each in found)
     worst = float(((radii + radii[nearest]) / distances).max())
@@ -58,6 +57,5 @@ def nearest_distances(points: Array) -> Array:
         apart = np.hypot(*(points.T[:, None] - points.T[:, :, None]))
         np.fill_diagonal(apart, np.inf)
         return np.asarray(apart.min(axis=0))
-    from scipy.spatial import cKDTree  # takes as long to import as a small scene to compute
 
-    return np.asarray(cKDTree(points).query(points, k=2)[0])[:, 1]
+    return np.asarray(scipy.spatial.cKDTree(points).query(points, k=2)[0])[:, 1]

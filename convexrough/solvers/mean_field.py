@@ -11,6 +11,7 @@ an asperity by its own load. Newton's method solves w = K P(w) (Greenwood and Tr
 from __future__ import annotations
 
 import numpy as np
+import scipy  # its parts are imported when they are used
 
 from convexrough.arrays import Array
 from convexrough.normal.law import on_hertz_pressure, smooth_reach
@@ -104,10 +105,12 @@ def mean_field_indentation(problem: NormalProblem) -> Array:
 
 def _disc(distance: Array, radius: Array) -> Array:
     """The integral of 1 / r over a disc; r is measured from a point `distance` off the centre."""
-    from scipy.special import ellipe, ellipk  # 0.1 s to import: only for many asperities
-
     r, a = np.broadcast_arrays(distance, radius)
     inside = r < a
     m = (np.minimum(r, a) / np.maximum(r, a)) ** 2
-    outer = np.where(inside, 0.0, r * (ellipe(m) - (1.0 - m) * ellipk(np.minimum(m, 1 - 1e-15))))
-    return 4.0 * np.where(inside, a * ellipe(m), outer)
+    outer = np.where(
+        inside,
+        0.0,
+        r * (scipy.special.ellipe(m) - (1.0 - m) * scipy.special.ellipk(np.minimum(m, 1 - 1e-15))),
+    )
+    return 4.0 * np.where(inside, a * scipy.special.ellipe(m), outer)

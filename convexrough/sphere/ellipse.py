@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import scipy  # its parts are imported when they are used
 
 from convexrough.arrays import Number
 
@@ -19,12 +20,11 @@ def slenderness(ratio: Number) -> Number:
     """The ratio b / a <= 1 of the contact ellipse for radii with the ratio Rx / Ry >= 1, by the
     secant method in logarithms, in which Rx / Ry and b / a are nearly linear.
     """
-    from scipy.special import elliprd
 
     def radii(log: Number) -> Number:
         """The logarithm of Rx / Ry, given the logarithm of b / a."""
         q = np.exp(2.0 * log)
-        return np.log(elliprd(0.0, 1.0, q) / elliprd(0.0, q, 1.0))
+        return np.log(scipy.special.elliprd(0.0, 1.0, q) / scipy.special.elliprd(0.0, q, 1.0))
 
     wanted = np.log(ratio)
     before, log = -0.5 * wanted, -2.0 / 3.0 * wanted  # the second holds if Rx is nearly Ry
@@ -41,20 +41,20 @@ def semi_axes(
     load: float, contact_modulus: float, radii: tuple[float, float]
 ) -> tuple[float, float]:
     """[length] the semi-axes of the contact ellipse, a along x and b along y."""
-    from scipy.special import elliprd
-
     largest = max(radii)
     q = float(slenderness(largest / min(radii)))
-    a = math.cbrt(load * largest / (math.pi * contact_modulus) * float(elliprd(0.0, q * q, 1.0)))
+    a = math.cbrt(
+        load * largest / (math.pi * contact_modulus) * float(scipy.special.elliprd(0.0, q * q, 1.0))
+    )
     return (a, q * a) if radii[0] == largest else (q * a, a)
 
 
 def approach(load: float, contact_modulus: float, axes: tuple[float, float]) -> float:
     """[length] the approach delta of distant points of the two bodies."""
-    from scipy.special import elliprf
-
     a, b = axes
-    return 1.5 * load / (math.pi * contact_modulus) * float(elliprf(0.0, a * a, b * b))
+    return (
+        1.5 * load / (math.pi * contact_modulus) * float(scipy.special.elliprf(0.0, a * a, b * b))
+    )
 
 
 def load_ratio(ratio: Number) -> Number:
@@ -66,8 +66,6 @@ def load_ratio(ratio: Number) -> Number:
 
     ratio : Rx / Ry >= 1
     """
-    from scipy.special import elliprd, elliprf
-
     square = slenderness(ratio) ** 2
-    shape = np.sqrt(np.sqrt(ratio) * elliprd(0.0, square, 1.0))
-    return 0.75 * np.pi * shape / (1.5 * elliprf(0.0, 1.0, square)) ** 1.5
+    shape = np.sqrt(np.sqrt(ratio) * scipy.special.elliprd(0.0, square, 1.0))
+    return 0.75 * np.pi * shape / (1.5 * scipy.special.elliprf(0.0, 1.0, square)) ** 1.5

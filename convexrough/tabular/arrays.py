@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy  # its parts are imported when they are used
 from numpy.typing import NDArray
 
 from convexrough.errors import ConvexroughError, ExtraError, FileError, file_errors, needed
@@ -146,13 +147,11 @@ def _table(values: NDArray[Any]) -> Columns:
 def _matlab(path: Path) -> dict[str, Any]:
     """The variables of a file or, if its only variable is a structure, its fields; those of other
     structures by names such as info.unit."""
-    from scipy.io import loadmat  # takes 0.1 s to import
-
     with path.open("rb") as raw:
         if b"\x89HDF" in raw.read(1024):
             raise FileError(f"{path}: MATLAB's version 7.3, which is HDF5; save(..., '-v7')")
     with foreign():
-        found = loadmat(str(path), appendmat=False, simplify_cells=True)
+        found = scipy.io.loadmat(str(path), appendmat=False, simplify_cells=True)
     named = {name: each for name, each in found.items() if not name.startswith("__")}
     only = next(iter(named.values())) if len(named) == 1 else None
     return dict(_flat("", only if isinstance(only, dict) else named))

@@ -17,6 +17,7 @@ from fractions import Fraction
 from typing import ClassVar
 
 import numpy as np
+import scipy  # its parts are imported when they are used
 
 from convexrough.arrays import Array
 from convexrough.convex import newton
@@ -113,8 +114,6 @@ class _Friction:
 
         If the matrix is not positive definite, a diagonal makes the kernel semidefinite.
         """
-        from scipy.linalg.lapack import dpotrf, dpotrs  # 0.2 s to import: only when solving
-
         problem, n = self.problem, len(self.problem)
         roots = _roots(problem, state.unknown)
         scaled = problem.kernel
@@ -125,13 +124,13 @@ class _Friction:
         turned = np.swapaxes(roots, 1, 2)  # W' for dX along x and along y
         right = np.concatenate((pushed[:, :, None], turned), axis=2).reshape(2 * n, 3)
         matrix = scaled + np.eye(2 * n)
-        factor, info = dpotrf(matrix.T, lower=1, clean=0)
+        factor, info = scipy.linalg.lapack.dpotrf(matrix.T, lower=1, clean=0)
         if info != 0:  # with the diagonal, all eigenvalues are at least 1, up to rounding
             slopes = np.einsum("nij,nij->nj", roots, roots).reshape(-1)
             shift = np.repeat(problem.share * problem.compliance, 2)
             matrix[np.diag_indices(2 * n)] += shift * slopes
-            factor, _ = dpotrf(matrix.T, lower=1, clean=0)
-        solved = dpotrs(factor, right, lower=1)[0].reshape(n, 2, 3)
+            factor, _ = scipy.linalg.lapack.dpotrf(matrix.T, lower=1, clean=0)
+        solved = scipy.linalg.lapack.dpotrs(factor, right, lower=1)[0].reshape(n, 2, 3)
         forces = np.einsum("nij,njk->nik", roots, solved)  # dq = W y
         sums = forces.sum(axis=0)
         change = np.linalg.lstsq(sums[:, 1:], -sums[:, 0], rcond=None)[0]  # dX, so that sum dq = 0

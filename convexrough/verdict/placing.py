@@ -11,6 +11,7 @@ from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import scipy  # its parts are imported when they are used
 from numpy.typing import NDArray
 
 from convexrough import checks
@@ -121,7 +122,6 @@ class Placing:
         """(m,) the asperity of each node, the one with the least r_i^2 - a_i^2 at the distance r_i;
         and (n,) the radii a_i of the discs under the sums. So discs that do not overlap keep all of
         their nodes. If one reaches beyond its neighbour, the nearest are taken."""
-        from scipy.spatial import cKDTree  # takes 0.1 s to import
 
         def discs(owners: Indices) -> Array:
             loads = np.bincount(owners, values, minlength=len(self.scene)).clip(min=0.0)
@@ -133,7 +133,7 @@ class Placing:
             if (radii > self._apart).any():  # loads in a wrong unit
                 break
             height = np.sqrt(np.maximum(radii.max() ** 2 - radii**2, 0.0))
-            raised = cKDTree(np.column_stack((self.scene.contact_points, height)))
+            raised = scipy.spatial.cKDTree(np.column_stack((self.scene.contact_points, height)))
             owners = np.asarray(raised.query(nodes)[1])
             if np.array_equal(owners, before):
                 return owners, radii
@@ -199,13 +199,11 @@ class Placing:
 
     @cached_property
     def _tree(self) -> cKDTree:
-        from scipy.spatial import cKDTree  # takes 0.1 s to import
-
         tops, contacts = self.scene.asperities.positions, self.scene.contact_points
         if self.summed:
-            return cKDTree(contacts)
+            return scipy.spatial.cKDTree(contacts)
         # With the closest-point geometry, files can have the tops or the contact points.
-        trees = cKDTree(tops), cKDTree(contacts)
+        trees = scipy.spatial.cKDTree(tops), scipy.spatial.cKDTree(contacts)
         return min(trees, key=lambda tree: np.median(tree.query(self.points)[0]) > self._allowed)
 
     def _nearest(self, points: Array) -> tuple[Array, Indices]:
