@@ -52,8 +52,9 @@ def work_figure(bench: Bench) -> Figure:
         handles |= dict(zip(names, lines, strict=True))
     figure.supxlabel("largest error of a load / largest load", fontsize=LABEL)
     figure.supylabel("seconds", fontsize=LABEL)
-    how = {"handles": [*handles.values()], "loc": "outside upper center", "ncols": 3}
-    style.legend(figure, "outside", **how)
+    order = [*(look.get("label", name) for name, look in LOOKS.items()), "frontier"]
+    shown = [handles[name] for name in order if name in handles]
+    style.legend(figure, "outside", handles=shown, loc="outside upper center", ncols=3)
     return figure
 
 
