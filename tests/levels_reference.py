@@ -21,6 +21,7 @@ from multiprecision import (
     exact,
     mid,
     newton,
+    off,
     slide,
     travel_of,
 )
@@ -203,7 +204,8 @@ def known(gradient: cr.Gradient, name: str) -> tuple[Array, Array]:
 def assert_slopes(
     judge: Judge, gradient: cr.Gradient, *more: str, seed: int = 0, sharp: float = 0.0
 ) -> None:
-    """Every derivative within its bound of differences, arrays along random signs."""
+    """The value and every derivative, arrays along random signs, within their bounds."""
+    assert off(gradient.value, judge.at) <= gradient.value_error
     rng = np.random.default_rng(seed)
     names = (name for name in NAMES if getattr(gradient, name) is not None)
     for name in (*names, *more):
@@ -215,9 +217,9 @@ def assert_slopes(
 def assert_close(true: Balls, terms: Any, errors: Any, name: str, sharp: float = 0.0) -> None:
     """A difference, and terms whose sum it is within their errors."""
     with ctx.workdps(DIGITS):
-        off = float(abs(exact(terms).sum() - true))
+        apart = float(abs(exact(terms).sum() - true))
     # The difference itself has some 20 digits.
-    assert off <= errors.sum() + 1e-18 * abs(float(true)), (name, off, errors.sum(), float(true))
+    assert apart <= errors.sum() + 1e-18 * abs(float(true)), (name, apart, errors, float(true))
     if sharp:
         assert errors.max() <= sharp * np.abs(terms).max() + 1e-200, name
 
