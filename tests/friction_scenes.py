@@ -62,9 +62,9 @@ def path_of(name: str, points: Any) -> tuple[cr.Scene, Array, Array]:
     return SCENES[name][0], P, 0.5 * T
 
 
-def follow(name: str, points: list[tuple[float, float]]) -> cr.LoadPath:
+def follow(name: str, points: Any, along: Any = cr.load_path) -> Any:
     scene, loads, forces = path_of(name, points)
-    return cr.load_path(scene, loads=loads, forces=forces)
+    return along(scene, loads=loads, forces=forces)
 
 
 #: Asperities under a sphere so large that it is flat where they are, with friction.
