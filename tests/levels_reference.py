@@ -9,22 +9,11 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
+import multiprecision
 import numpy as np
 from flint import arb, ctx
 from friction_scenes import FRICTION, pressed
-from multiprecision import (
-    Balls,
-    NormalMap,
-    assemble,
-    coupling,
-    cube_root,
-    exact,
-    mid,
-    newton,
-    off,
-    slide,
-    travel_of,
-)
+from multiprecision import Balls, cube_root, exact, mid, off, travel_of
 
 import convexrough as cr
 from convexrough.arrays import Array
@@ -78,15 +67,16 @@ class Oracle:
     def __init__(self, setup: Setup, start: "cr.Contact | Oracle") -> None:
         s = self.setup = setup
         self.bends, modulus = exact(np.zeros(2)) + 1 / s.sphere_radius, s.contact_modulus
-        points, self.offsets, law = assemble(
+        points, self.offsets, law = multiprecision.assemble(
             s.positions, s.tip_radii, s.heights, self.bends, modulus, s.geometry
         )
-        self.A, loads = coupling(points, modulus), exact(start.loads)
+        self.A, loads = multiprecision.coupling(points, modulus), exact(start.loads)
         on = self.touching = np.flatnonzero([bool(load > 0) for load in loads])
         self.inner = self.A[np.ix_(on, on)]
-        problem = NormalMap(self.inner, law[on], self.offsets[on], s.control, s.by_load, arb(1))
+        given = self.inner, law[on], self.offsets[on], s.control, s.by_load, arb(1)
+        problem = multiprecision.NormalMap(*given)
         x = mid(np.append(law[on] * cube_root(loads[on]) ** 2, arb(start.approach)))
-        x = newton(problem, x, tolerance=abs(x[-1]) * arb(10) ** (10 - DIGITS))
+        x = multiprecision.newton(problem, x, tolerance=abs(x[-1]) * arb(10) ** (10 - DIGITS))
         self.P, self.approach = problem.loads(x), x[-1]
         self.load = self.P.sum() if len(self.P) else arb(0)
         self.loads, self.thresholds = (np.full(len(law), arb(0)) for _ in range(2))
@@ -134,7 +124,7 @@ class Friction:
         s = held.setup
         self.pressed, self.held, self.T, self.f = pressed, held, T, s.friction
         self.loads = pressed.loads
-        found = slide(s.friction, s.poisson_ratio, pressed, held)
+        found = multiprecision.slide(s.friction, s.poisson_ratio, pressed, held)
         self.forces, self.slips, self.displacement, self.energies, self.energy = found
         relative = 1 / (held.bends.sum() / 2 + 1 / s.tip_radii)
         self.stick_radii = cube_root(3 * held.loads * relative / (4 * s.contact_modulus))
@@ -289,6 +279,5 @@ def cycle_loss(contact: cr.Contact, force: float, steps: int = 50, count: int = 
     """The energy of the steady cycle between +-Q, by `Bristles`."""
     state = Bristles(contact, count).to(np.linspace(0, force, steps + 1)[1:])
     down = np.linspace(force, -force, 2 * steps + 1)[1:]
-    state.to(np.concatenate((down, -down)))
-    before = state.lost
-    return state.to(np.concatenate((down, -down))).lost - before
+    first, second = (state.to(np.concatenate((down, -down))).lost for _ in range(2))
+    return second - first
