@@ -60,17 +60,19 @@ def test_three_ways_to_the_energy(name: str) -> None:
         assert errors[1:] / errors[:-1] == pytest.approx(0.25, abs=0.03)
 
 
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(st.lists(st.floats(-0.95, 0.95), min_size=1, max_size=25))
 def test_histories_against_springs_with_sliders(fractions: list[float]) -> None:
-    """Bristles in steps, which remember by construction."""
+    """Bristles in steps, which remember by construction, and what they lose in slip."""
     contact = pressed("paper")
     forces = [fraction * limit_of(contact) for fraction in fractions]
     past, state, true = cr.history(contact, forces=forces), Bristles(contact, 300), []
     for before, after in pairwise([0.0, *forces]):
-        true.append(state.to(np.linspace(before, after, 11)[1:]).displacement)
-    scale = cr.shear(contact, force=0.95 * limit_of(contact)).displacement
-    assert_allclose(past.displacements, true, atol=1e-4 * scale)
+        state.to(np.linspace(before, after, 11)[1:])
+        true.append((state.displacement, state.lost))
+    most = cr.cycle(contact, maximum=0.95 * limit_of(contact))
+    apart = np.column_stack((past.displacements, past.losses)) - true
+    assert (np.abs(apart) <= 1e-4 * np.array([most.displacement_amplitude, most.loss])).all()
 
 
 @settings(max_examples=8, deadline=None)
@@ -87,22 +89,6 @@ def test_return_point_memory_and_wiping_out(inner: list[float]) -> None:
     fresh = cr.shear(contact, force=0.8 * limit)
     assert_allclose(after.asperity_forces[-1], fresh.forces, atol=1e-12 * limit)
     assert after.displacements[-1] == pytest.approx(fresh.displacement, rel=1e-12)
-
-
-@settings(max_examples=4, deadline=None)
-@given(st.lists(st.floats(-1, 1), min_size=1, max_size=2))
-def test_history_energy_is_the_area(fractions: list[float]) -> None:
-    """Work done along a path that ends in a closed cycle, less that of the path before it."""
-    contact = pressed("paper")
-    limit = limit_of(contact)
-    turns = np.array([0.0, 1.0, *fractions, -1.0, 1.0]) * limit
-    fine = np.concatenate([np.linspace(a, b, 30)[1:] for a, b in pairwise(turns)])
-    path = cr.history(contact, forces=fine)
-    begin = 28  # the first visit of the limit; the end is the same state again
-    work = np.trapezoid(path.forces[begin:], path.displacements[begin:])
-    spent = path.losses[-1] - path.losses[begin]
-    assert spent == pytest.approx(work, rel=1e-2)
-    assert (np.diff(path.losses) >= -1e-12 * path.losses[-1]).all()
 
 
 @pytest.mark.parametrize("influence", KINDS)
