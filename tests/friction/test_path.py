@@ -81,11 +81,8 @@ def test_constant_load_is_a_history(name: str) -> None:
     contact = cr.press(scene, load=P[0])
     past = cr.history(contact, forces=Q)
     path = cr.load_path(scene, start=contact, loads=P, forces=Q)
-    loaded = contact.loads > 0
+    assert differs(path, past) < 1e-13
     assert_allclose(path.displacements, past.displacements, rtol=1e-13, atol=1e-18)
-    assert_allclose(path.asperity_forces, past.asperity_forces, atol=1e-13 * Q.max())
-    own, theirs = (each.asperity_displacements[:, loaded] for each in (path, past))
-    assert_allclose(own, theirs, atol=1e-13 * np.abs(past.displacements).max())
     assert_allclose(path.losses, past.losses, rtol=1e-12)
     difference = np.abs(path.displacements - past.displacements)
     assert (difference <= path.displacement_errors + past.displacement_errors).all()

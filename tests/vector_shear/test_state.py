@@ -17,7 +17,6 @@ from status_audit import ATTACKS, Tally, attack, audit_vectors
 import convexrough as cr
 from convexrough import FrictionConic, FrictionNewton, VectorShearState, shear_vector
 from convexrough.arithmetic.balls import Ball
-from convexrough.sphere import mindlin
 from convexrough.vector_shear import cones
 from convexrough.vector_shear.certificate import certify_vectors
 from convexrough.vector_shear.problem import FrictionProblem, VectorState
@@ -79,7 +78,6 @@ def test_the_error_of_the_papers_assumption(
     assert np.abs(state.forces[:, 1]).max() / largest == pytest.approx(transverse, rel=0.02)
     reference = cr.shear(pressed("paper", nu=0.0), force=fraction * FRICTION * contact.load)
     assert state.displacement[0] / reference.displacement == pytest.approx(travel, abs=6e-6)
-    assert abs(state.displacement[0] / reference.displacement - mindlin.ratio(nu)) < 3e-3
     assert (state.status == "sliding").sum() == sliding
     assert state.certificate.all_proved
     assert state.iterations <= 6
@@ -312,8 +310,8 @@ def test_the_duality_gap_bounds_what_forces_cost_too_much(
 
     best = FrictionNewton().solve(problem, total)
     least = energy(best)
-    lacking = np.abs(problem.loads - np.hypot(*best.increments.T))
-    assert duality_gap(best) >= 0.9 * np.hypot(*best.slips.T) @ lacking  # by rounding
+    lacking = np.abs(problem.loads - lengths(best.increments))
+    assert duality_gap(best) >= 0.9 * lengths(best.slips) @ lacking  # by rounding
     assert 0 <= duality_gap(best) <= 1e-11 * least
     short = best._replace(increments=0.99 * best.increments)
     assert duality_gap(short) > 5e-3 * least  # 1 % of the total is missing
