@@ -1,6 +1,5 @@
 """Cycles, histories, fretting: memory, energies counted in independent ways, many at once."""
 
-import math
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -140,9 +139,9 @@ def test_amplitudes_of_forces_that_differ_by_a_last_bit() -> None:
     limit = limit_of(contact)
     stiffness = cr.cycle(contact, maximum=1e-6 * limit).secant_stiffness
     for q in (limit * np.linspace(0.2, 0.4, 30)).tolist():
-        cycle = cr.cycle(contact, maximum=q, minimum=math.nextafter(q, 0.0))
+        cycle = cr.cycle(contact, maximum=q, minimum=np.nextafter(q, 0.0))
         assert cycle.secant_stiffness == pytest.approx(stiffness, rel=1e-3)
-        forces = [q, -0.5 * q, q, math.nextafter(-0.5 * q, -1.0)]
+        forces = [q, -0.5 * q, q, np.nextafter(-0.5 * q, -1.0)]
         many, two = (
             cr.steady(contact.scene, loads=[contact.load] * len(each), forces=each)
             for each in (forces, forces[2:])

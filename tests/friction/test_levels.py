@@ -1,6 +1,5 @@
 """States, cycles, paths and given forces against levels in 130 digits: values and bounds."""
 
-import math
 from dataclasses import replace
 from fractions import Fraction
 from itertools import product
@@ -130,7 +129,7 @@ def test_a_force_that_may_be_the_limit_of_a_rounded_load() -> None:
 
 def test_levels_of_a_fine_lattice_are_proved_where_the_bound_of_a_rim_is_tiny() -> None:
     """The largest possible load of some asperity, 1e-23, is less than the error bounds of loads."""
-    scene = replace(hexagonal(0.0025 / 12, 0.02 / 12, math.sqrt(2 * 5e-5)), friction=0.5)
+    scene = replace(hexagonal(0.0025 / 12, 0.02 / 12, 0.01), friction=0.5)
     contact = cr.press(scene, approach=5e-5)
     state = cr.shear(contact, force=0.45 * contact.load)
     assert state.order.startswith("proved")

@@ -5,7 +5,6 @@ Whatever the checker accepts is true by the reference.
 
 import ast
 import json
-import math
 import os
 import random
 import re
@@ -331,8 +330,8 @@ def test_cholesky_finds_where_the_matrix_turns_indefinite() -> None:
 def test_two_solutions_are_both_proved_and_neither_is_the_only_one() -> None:
     """Deep in two neighbours: one carries all and keeps the other open, or the other way round."""
     depth, scene = 1.0, scenes.on_sphere([[0, 0], [1.0, 0]], 9.0, radius=1e30)
-    a = math.sqrt(float(scene.relative_radii[0]) * depth)
-    assert a > 3 * math.pi / 4  # then it pushes the other down by more than the approach
+    a = float(np.sqrt(scene.relative_radii[0] * depth))
+    assert a > 3 * np.pi / 4  # then it pushes the other down by more than the approach
     document = proof_of(scene, 1e-9)
     for first, second in ((a, 0.0), (0.0, a)):
         box = [max(1.01 * x, 0.3).hex() for x in (first, second)]
