@@ -229,11 +229,8 @@ class Bristles:
         scene, on, P = contact.scene, self.on, contact.loads[self.on]
         nu, E = scene.material.poisson_ratio, scene.material.contact_modulus
         self.f, self.ratio = scene.friction or 0.0, (2 - nu) / (2 * (1 - nu))
-        points = scene.contact_points[on]
-        apart = np.hypot(*np.moveaxis(points[:, None] - points, -1, 0))
-        np.fill_diagonal(apart, np.inf)
-        self.A = 1 / (np.pi * E * apart)
-        self.k = np.cbrt(9 / (16 * E**2) / scene.relative_radii[on])
+        points, _, law = (each[on] for each in multiprecision.of_scene(scene))
+        self.A, self.k = multiprecision.coupling(points, arb(E)).astype(float), law.astype(float)
         self.C = self.k * np.cbrt(P) ** 2
         self.stiffness = 1.5 * P / self.C * reach
         self.below = self.C[:, None] * (reach * (np.arange(count) + 0.5) / count) ** 2

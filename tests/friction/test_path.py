@@ -352,8 +352,7 @@ def cut(curve: MemoryCurve, level: Fraction) -> list[Point]:
     """The vertices below a level of the curve, and the point there."""
     if level == 0:
         return [(level, level)]
-    pairs = list(zip(curve.levels, curve.heights, strict=True))
-    below = [pair for pair in pairs if pair[0] < level]
+    below = [pair for pair in zip(curve.levels, curve.heights, strict=True) if pair[0] < level]
     k = len(below) - 1
     height = curve.heights[k] + curve.slopes[k] * (level - curve.levels[k])
     return [*below, (level, height)]

@@ -24,7 +24,7 @@ import pytest
 import scenes
 from flint import arb, ctx
 from friction_scenes import ring, shaded
-from multiprecision import false_claims, quotient
+from multiprecision import coupling, exact, false_claims, quotient
 
 import convexrough as cr
 from convexrough import checker
@@ -313,11 +313,8 @@ def test_cholesky_finds_where_the_matrix_turns_indefinite() -> None:
     scene, _ = scenes.scattered(11, 12, 0.5, 0.5)
     read = checker.read_scene(proof_of(scene, 1e-9)["scene"])
     radii = np.random.default_rng(0).uniform(0.1, 1, 12)
-    points = scene.contact_points
-    apart = np.hypot(*(points[:, None] - points).transpose(2, 0, 1))
-    np.fill_diagonal(apart, np.inf)
-    root = np.sqrt(2 * radii)
-    end = -1 / np.linalg.eigvalsh(root[:, None] / (np.pi * apart) * root).min()
+    root, A = np.sqrt(2 * radii), coupling(exact(scene.contact_points), arb(1)).astype(float)
+    end = -1 / np.linalg.eigvalsh(root[:, None] * A * root).min()
     for factor, definite in ((0.5, True), (1 - 1e-12, True), (1 + 1e-12, False), (2, False)):
         given = [Fraction(float(radius * end * factor)) for radius in radii]
         try:

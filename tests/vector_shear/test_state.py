@@ -48,9 +48,10 @@ def test_without_poissons_ratio_it_is_ciavarella_and_jaeger(name: str, fraction:
     assert_allclose(state.forces[:, 0], scalar.forces, rtol=1e-10)
     assert (state.forces[:, 1] == 0).all()
     assert state.disagreement < 1e-10
-    assert_allclose(state.displacement, [scalar.displacement, 0.0], rtol=1e-10)
-    atol = 1e-10 * scalar.displacement
-    assert_allclose(state.slips[:, 0], scalar.slips, rtol=1e-9, atol=atol)
+    close = 1e-10 if fraction < 1 else 1e-13
+    assert_allclose(state.displacement, [scalar.displacement, 0.0], rtol=close)
+    atol = close * scalar.displacement
+    assert_allclose(state.slips[:, 0], scalar.slips, rtol=10 * close, atol=atol)
     assert_allclose(state.stick_radii, scalar.stick_radii, rtol=1e-6)
     assert set(state.status[contact.loads == 0]) == {"open"}
     if fraction < 1:  # below f P not all slide
@@ -110,11 +111,7 @@ def test_gross_sliding() -> None:
     assert state.residual == state.duality_gap == np.inf
     assert (state.status[contact.loads > 0] == "sliding").all()
     assert state.certificate.all_proved
-    finite = found("paper", 0.0, 1.0)
-    scalar = cr.shear(pressed("paper", nu=0.0), force=finite.force[0])
-    assert_allclose(finite.displacement[0], scalar.displacement, rtol=1e-13)
-    assert_allclose(finite.slips[:, 0], scalar.slips, atol=1e-13 * scalar.displacement)
-    assert finite.residual < 1e-13
+    assert found("paper", 0.0, 1.0).residual < 1e-13
     for off in (-8, 8):
         rounded = shear_vector(contact, force=state.force * (1 + off * 2.0**-53))
         assert rounded.force.tolist() == state.force.tolist()
