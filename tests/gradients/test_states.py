@@ -310,8 +310,7 @@ def test_gross_sliding_from_one_side() -> None:
     moved = cr.shear(contact, force=force).gradient(displacement=1.0)
     assert (moved.force, moved.load, moved.friction) == (np.inf, -np.inf, -np.inf)
     top = contact.gradient(approach=1.0).heights
-    unit = 2.0 * gradient.poisson_ratio / gradient.value  # c_t by its derivative, and f
-    assert unit > 0
+    assert gradient.poisson_ratio > 0
     first = np.arange(len(top)) == np.argmax(contact.scene.offsets)
     ratio = (2 - 0.3) / (2 * 0.7) * FRICTION
     np.testing.assert_allclose(moved.heights, ratio * (top + first), rtol=1e-14)
