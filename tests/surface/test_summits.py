@@ -40,13 +40,13 @@ def surface(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> cr.surface.Surfa
 
 
 @pytest.fixture
-def find(command: Any) -> Any:
-    """`convexrough summits` with arguments, without figures, over earlier results."""
-    return lambda *arguments: command("summits", *arguments, "--no-figures", "--force")
+def find(command: Any, surface: cr.surface.Surface) -> Any:
+    """`convexrough summits` on that map or others, without figures, over earlier results."""
+    return lambda line: command("summits", *line.split(), "--no-figures", "--force")
 
 
 #: Options that press a sphere.
-PRESSED = ("--radius", "1e4", "--load", "10", "--modulus", "1")
+PRESSED = "--radius 1e4 --load 10 --modulus 1"
 
 
 def numbers(table: str, name: str) -> list[float]:
@@ -56,30 +56,27 @@ def numbers(table: str, name: str) -> list[float]:
     return [float(row[column]) for row in found]
 
 
-@pytest.mark.usefixtures("surface")
-def test_a_scan_becomes_a_scene(command: Any) -> None:
-    outcome = command("summits", "scan.npz", "--no-figures")
+def test_a_scan_becomes_a_scene(find: Any) -> None:
+    outcome = find("scan.npz")
     assert outcome.status == 0
     assert outcome.err.startswith("convexrough: hint: use --scene or --radius to press")
     assert outcome.out.endswith("\nwritten to scan-summits: summits.csv, summary.json\n")
-    summits = cr.surface.read("scan.npz").summits()
+    found = cr.surface.read("scan.npz")
+    summits = found.summits()
     for name, values in summits.columns().items():
         assert numbers("summits", name) == values.tolist()
     scene = cr.read_scene("scene.toml").scene
     np.testing.assert_array_equal(scene.asperities.positions, summits.positions)
     np.testing.assert_array_equal(scene.asperities.tip_radii, summits.tip_radii)
-    counted = f"summits           {len(summits):,}  (of {summits.origin.maxima:,} maxima"
-    assert counted in outcome.out
+    assert f"summits           {len(summits):,}  (of {summits.origin.maxima:,} m" in outcome.out
     assert "removed           plane, slopes 0.01" in outcome.out
-    found = cr.surface.read("scan.npz")
     density = found.summits(0.0).statistics.density
     said = rf"density +\[1/µm²\] +{density:.4g} +\S+ +{found.moments.density:.4g}"
     assert re.search(said, outcome.out)
 
 
-@pytest.mark.usefixtures("surface")
 def test_pressed_as_a_scene_says(find: Any) -> None:
-    outcome = find("scan.npz", "--scene", "scene.toml", "--json")
+    outcome = find("scan.npz --scene scene.toml --json")
     assert (outcome.status, "reads" in outcome.err) == (0, False)
     found = json.loads(outcome.out)
     file = cr.read_scene("scene.toml")  # of the table that was just written
@@ -93,16 +90,15 @@ def test_pressed_as_a_scene_says(find: Any) -> None:
     assert {row["doubt"] for row in later if row["contacts"] >= 5} == {""}
     assert rows("scan-summits/provability.csv")[0]["prune"] == "0.0"
     assert json.loads(Path("scan-summits/summary.json").read_text()) == found
-    assert json.loads(find("scan.npz", *PRESSED, "--load", "100", "--json").out) == found
+    assert json.loads(find(f"scan.npz {PRESSED} --load 100 --json").out) == found
 
 
-@pytest.mark.usefixtures("surface")
 def test_a_scene_in_another_unit(find: Any) -> None:
     """A map in µm for a scene in m: the table is in m, and the contact the same."""
     write_scene("metres.toml", "m", radius=0.01, modulus=1e12)
 
     def pressed(scene: str) -> tuple[Any, Any]:
-        found = json.loads(find("scan.npz", "--scene", scene, "--json").out)
+        found = json.loads(find(f"scan.npz --scene {scene} --json").out)
         return found, np.array(numbers("summits", "tip_radius"))
 
     (one, radii), (other, smaller) = map(pressed, ("scene.toml", "metres.toml"))
@@ -112,34 +108,31 @@ def test_a_scene_in_another_unit(find: Any) -> None:
         assert first["contacts"] == second["contacts"]
         assert_allclose(second["approach"], 1e-6 * first["approach"], rtol=1e-6)
     np.save("nameless.npy", cr.surface.read("scan.npz").heights)
-    nameless = find("nameless.npy", "--pixel", "1", "--scene", "metres.toml")
+    nameless = find("nameless.npy --pixel 1 --scene metres.toml")
     assert nameless.refuses("expected a map with a unit, as metres.toml is in m: unit=")
     summits = cr.surface.read("scan.npz").summits(0.05)
     with pytest.raises(cr.InputError, match=r'summits in µm, expected .* Surface.to_unit\("m"\)'):
         cr.read_scene("metres.toml", asperities=summits)
     write_scene("unnamed.toml", "", radius=0.01, modulus=1e12)
-    unnamed = find("scan.npz", "--scene", "unnamed.toml")
-    assert unnamed.refuses("expected a unit of length in unnamed.toml")
+    said = "expected a unit of length in unnamed.toml"
+    assert find("scan.npz --scene unnamed.toml").refuses(said)
 
 
-@pytest.mark.usefixtures("surface")
 def test_not_certified_is_exit_status_three(find: Any) -> None:
     """A ridge with two tops that are almost one."""
     x, y = np.mgrid[-32:33, -32:33]
     tops = -1e-5 * (np.minimum(abs(x), 6) ** 2 - 16.0) ** 2
     save("scan.npz", tops - x**2 / 1e6 - y**2 / 4e3)
-    pressed = ("--radius", "1e4", "--approach", "3")
-    outcome = find("scan.npz", "--prune", "0", *pressed, "--detrend", "none")
+    outcome = find("scan.npz --prune 0 --radius 1e4 --approach 3 --detrend none")
     assert outcome.status == 3
     assert Path("scan-summits/summits.csv").exists()
     assert " none " in outcome.out
     assert "not met at a pruning of 0: status not proved; no pruning meets all" in outcome.err
 
 
-@pytest.mark.usefixtures("surface")
-def test_a_long_table_is_written_as_npz(command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_long_table_is_written_as_npz(find: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("convexrough.run.results.MOST_CSV_ROWS", 3)
-    assert "summits.npz" in command("summits", "scan.npz", "--no-figures").out
+    assert "summits.npz" in find("scan.npz").out
     columns = np.load("scan-summits/summits.npz")
     assert len(columns["height [µm]"]) == len(columns["deviation [µm]"]) > 3
 
@@ -149,58 +142,52 @@ def test_summits_on_filled_pixels_are_counted(find: Any, surface: cr.surface.Sur
     row, column = surface.summits().pixels[0]
     heights[row + 1 : row + 3, column] = np.nan
     save("holes.npz", heights)
-    said = find("holes.npz", *PRESSED, "--fill").err
+    said = find(f"holes.npz {PRESSED} --fill").err
     assert re.search("summits fitted to filled pixels.*: 1\n", said)
 
 
-@pytest.mark.sample(8)
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("bare.npy", "--pixel", "-1"), "pixel: found -1.0, expected a positive number"),
-        (("bare.npy", "--pixel", "one"), "--pixel: found 'one', expected a number, or two"),
-        (("bare.npy", "--pixel", "1", "--fit", "99"), "found 40 by 30 pixels, expected at"),
-        (("bare.npy", "--pixel", "1", "--prune", "5"), "prune: found 5.0, expected a number"),
-        (("plane.npy", "--pixel", "1"), "heights: found nothing but a plane"),
-        (("scan.npz", "--radius", "1"), "--radius needs exactly one of --approach and --load"),
-        (("scan.npz", "--load", "1"), "--approach, --load and --modulus need --radius"),
-        (("scan.npz", "--radius", "1", "--load", "1"), "--load needs --modulus"),
-        (("scan.npz", "--scene", "scene.toml", "--radius", "1"), "--scene excludes --radius"),
-        (("scan.npz", "--scene", "missing.toml"), "missing.toml: cannot be read"),
-        (("scan.npz", "--radius", "-1", "--approach", "1"), "sphere_radius: found -1.0"),
-        (("scan.npz", "--detrend", "cone"), "'cone' is not one of"),
-    ],
-)
-@pytest.mark.usefixtures("surface")
-def test_wrong_input(command: Any, arguments: tuple[str, ...], message: str) -> None:
-    rough = np.random.default_rng(1).standard_normal((30, 40))
-    np.save("bare.npy", rough)
+def test_wrong_input(find: Any) -> None:
+    np.save("bare.npy", np.random.default_rng(1).standard_normal((30, 40)))
     np.save("plane.npy", np.add.outer(np.arange(30.0), np.arange(40.0)))
     before = {path.name for path in Path().iterdir()}
-    outcome = command("summits", *arguments)
-    assert (outcome.status, outcome.out) == (2, "")
-    assert message in " ".join(outcome.err.split())
-    assert {path.name for path in Path().iterdir()} == before
+    for arguments, message in (
+        ("bare.npy --pixel -1", "pixel: found -1.0, expected a positive number"),
+        ("bare.npy --pixel one", "--pixel: found 'one', expected a number, or two"),
+        ("bare.npy --pixel 1 --fit 99", "found 40 by 30 pixels, expected at"),
+        ("bare.npy --pixel 1 --prune 5", "prune: found 5.0, expected a number"),
+        ("plane.npy --pixel 1", "heights: found nothing but a plane"),
+        ("scan.npz --radius 1", "--radius needs exactly one of --approach and --load"),
+        ("scan.npz --load 1", "--approach, --load and --modulus need --radius"),
+        ("scan.npz --radius 1 --load 1", "--load needs --modulus"),
+        ("scan.npz --scene scene.toml --radius 1", "--scene excludes --radius"),
+        ("scan.npz --scene missing.toml", "missing.toml: cannot be read"),
+        ("scan.npz --radius -1 --approach 1", "sphere_radius: found -1.0"),
+        ("scan.npz --detrend cone", "'cone' is not one of"),
+    ):
+        outcome = find(arguments)
+        assert (outcome.status, outcome.out) == (2, "")
+        assert message in " ".join(outcome.err.split())
+        assert {path.name for path in Path().iterdir()} == before
 
 
 def test_the_whole_map_beside_its_asperities(find: Any, surface: cr.surface.Surface) -> None:
     y, x = np.mgrid[:256, :256] - 127.5
     save("ball.npz", surface.heights - (x**2 + y**2) / 4000)
-    pressed = ("ball.npz", *PRESSED, "--whole")
-    ran = find(*pressed)
+    pressed = f"ball.npz {PRESSED} --whole"
+    ran = find(pressed)
     assert "of the variance of the heights: " in ran.err
     assert "--detrend sphere, removes it" in ran.err
     assert "at one approach  asperities  whole map  difference" in ran.out
-    said = find(*pressed, "--detrend", "sphere").out
+    said = find(f"{pressed} --detrend sphere").out
     unless = r"with the removed form, unless 10000 contains it already\n"
     assert re.search(rf"pressing radius +10000; 1\d+\.\d+ {unless}", said)
-    ran = find(*pressed, "--detrend", "sphere", "--json")
+    ran = find(f"{pressed} --detrend sphere --json")
     assert "variance" not in ran.err
     found = json.loads(ran.out)["whole"]
     assert found["load"]["asperities"] == pytest.approx(10.0)
     assert 0.7 < found["load"]["asperities"] / found["load"]["whole"] < 1.0
     assert found["resolution"] < 0.01
-    assert "--whole needs --scene or --radius" in find("ball.npz", "--whole").err
+    assert "--whole needs --scene or --radius" in find("ball.npz --whole").err
 
 
 def test_a_map_in_micrometres_called_millimetres(find: Any, surface: cr.surface.Surface) -> None:
@@ -208,14 +195,13 @@ def test_a_map_in_micrometres_called_millimetres(find: Any, surface: cr.surface.
     np.save("map.npy", surface.heights)
     write_scene("mm.toml", "mm", radius=10.0, modulus=1e5, load=1.0)
     for unit, wrong in (("mm", True), ("µm", False)):
-        said = find("map.npy", "--scene", "mm.toml", "--pixel", "1", "--unit", unit).err
+        said = find(f"map.npy --scene mm.toml --pixel 1 --unit {unit}").err
         assert ("the map is 256 mm wide, and the sphere 20 mm: check the units" in said) == wrong
         assert ("asperities in contact: 1, fewer than 5" in said) == wrong
 
 
-@pytest.mark.usefixtures("surface")
 def test_where_nothing_touches_nothing_is_to_be_trusted(find: Any) -> None:
-    outcome = find("scan.npz", "--radius", "1e4", "--approach", "-100")
+    outcome = find("scan.npz --radius 1e4 --approach -100")
     place = "pressed at        approach of the pressing body from height 0: -100 µm\npruning"
     assert place in outcome.out
     assert "no asperity carries a load: check the sign and unit of the approach" in outcome.err
@@ -227,7 +213,7 @@ def test_heights_far_from_zero(find: Any, surface: cr.surface.Surface) -> None:
     found = []
     for offset, warned in ((0, False), (5000, True)):
         save("scan.npz", surface.heights + offset)
-        ran = find("scan.npz", "--scene", "scene.toml", "--detrend", "none")
+        ran = find("scan.npz --scene scene.toml --detrend none")
         assert ("the mean height is 5000 µm: approaches are measured from" in ran.err) == warned
         assert ("removed           nothing; the mean height is 5000 µm" in ran.out) == warned
         approaches = np.array(numbers("provability", "approach"))
@@ -238,31 +224,27 @@ def test_heights_far_from_zero(find: Any, surface: cr.surface.Surface) -> None:
     assert_allclose(found[0][0], found[1][0], rtol=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("curvatures", "degrees", "radii", "more"),
-    [
-        ((1 / 3e3, 0.0), 0.0, (2307.7, 1e4), ""),
-        ((1 / 3e3, 1 / 6e3), 30.0, (2307.7, 3750.0), "turn x and y of the summits by -[23]"),
-        ((1 / 3e3, 1 / 6e3), 120.0, (3750.0, 2307.7), "turn x and y of the summits by -[23]"),
-        ((1 / 3e3, -1 / 3e3), 0.0, (2307.7, -4285.7), ""),
-        ((-1 / 3e3, -1 / 3e3), 0.0, (-4285.7, -4285.7), ""),
-    ],
-)
-def test_the_body_with_a_removed_paraboloid(
-    find: Any, surface: cr.surface.Surface, curvatures: Any, degrees: float, radii: Any, more: str
-) -> None:
+def test_the_body_with_a_removed_paraboloid(find: Any, surface: cr.surface.Surface) -> None:
     """The radii that a scene accepts, along x and y; else the angle by which to turn summits."""
     y, x = np.mgrid[:256, :256] - 127.5
-    u = (x + 1j * y) * np.exp(-1j * np.radians(degrees))
-    form = -(curvatures[0] * u.real**2 + curvatures[1] * u.imag**2) / 2
-    save("form.npz", surface.heights / 10 + form)
-    ran = find("form.npz", *PRESSED, "--detrend", "paraboloid")
-    found = json.loads(Path("form-summits/summary.json").read_text())["with_form"]
-    assert_allclose(found["radii"], radii, rtol=0.02)
-    if curvatures[0] != curvatures[1]:
-        assert_allclose(found["angle"], 30.0 if degrees else 0.0, atol=1)
-    (line,) = re.findall("pressing radius.*", ran.out)
-    assert re.search(more or r"\] with the removed form", line), line
+    for curvatures, degrees, radii in (
+        ((1 / 3e3, 0.0), 0.0, (2307.7, 1e4)),
+        ((1 / 3e3, 1 / 6e3), 30.0, (2307.7, 3750.0)),
+        ((1 / 3e3, 1 / 6e3), 120.0, (3750.0, 2307.7)),
+        ((1 / 3e3, -1 / 3e3), 0.0, (2307.7, -4285.7)),
+        ((-1 / 3e3, -1 / 3e3), 0.0, (-4285.7, -4285.7)),
+    ):
+        u = (x + 1j * y) * np.exp(-1j * np.radians(degrees))
+        form = -(curvatures[0] * u.real**2 + curvatures[1] * u.imag**2) / 2
+        save("form.npz", surface.heights / 10 + form)
+        ran = find(f"form.npz {PRESSED} --detrend paraboloid")
+        found = json.loads(Path("form-summits/summary.json").read_text())["with_form"]
+        assert_allclose(found["radii"], radii, rtol=0.02)
+        if curvatures[0] != curvatures[1]:
+            assert_allclose(found["angle"], 30.0 if degrees else 0.0, atol=1)
+        (line,) = re.findall("pressing radius.*", ran.out)
+        turn = "turn x and y of the summits by -[23]"
+        assert re.search(turn if degrees else r"\] with the removed form", line), line
 
 
 MAP = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1, pixels=384, unit="µm")
