@@ -14,7 +14,7 @@ from scipy.special import ellipe, ellipk
 
 import convexrough as cr
 from convexrough import fields
-from convexrough.sphere import hertz, surface_shear
+from convexrough.sphere import ellipse, hertz, surface_shear
 from convexrough.sphere.smooth import SmoothEllipsoid, SmoothSphere, smooth, smooth_reference
 
 R, RHO, FRICTION = 1.3, 0.4, 0.35
@@ -102,6 +102,8 @@ def test_semi_axes_and_approach_by_legendres_integrals(radii: tuple[float, float
     assert across == pytest.approx(1 / (2 * sharper), rel=rel)
     assert hertz.approach == pytest.approx(hertz.peak_pressure / 3.0 * b * ellipk(m), rel=1e-12)
     assert hertz.peak_pressure * 2 / 3 * np.pi * a * b == pytest.approx(2e-6, rel=1e-14)
+    sphere = 4.0 * np.sqrt(np.sqrt(flatter * sharper)) * hertz.approach**1.5  # of the mean radius
+    assert ellipse.load_ratio(flatter / sharper) == pytest.approx(2e-6 / sphere, rel=1e-8)
 
 
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
