@@ -26,6 +26,11 @@ def raw(path: Path, made: Any = None, **options: Any) -> cr.surface.Surface:
     return cr.surface.read(path, detrend=None, **options)
 
 
+def refused(said: str, *given: Any, error: Any = cr.InputError, **options: Any) -> None:
+    with pytest.raises(error, match=said):
+        raw(*given, **options)
+
+
 def matrix(heights: Any = HEIGHTS, separator: str = " ", ending: str = "\n") -> str:
     return "".join(separator.join(map(repr, row)) + ending for row in np.asarray(heights).tolist())
 
@@ -71,14 +76,12 @@ def test_arrays(tmp_path: Path) -> None:
           for shape in ((0, 5), (5, 0), (0,))),
         (sides | {"heights": np.vstack((X[:1], HEIGHTS))}, "row 1: found 0, 1, 2, 3, .*, exp"),
     ):  # fmt: skip
-        with pytest.raises(cr.InputError, match=said):
-            raw(several, arrays)
+        refused(said, several, arrays)
     for beside, said in (
         ({"scale": 0.5, "of": {"unit": "nm"}}, "arrays: found info.scale, info.of.unit, exp"),
         (np.array(["scale", 0.5], dtype=object), "arrays: found info, expected heights and pixel"),
     ):
-        with pytest.raises(cr.InputError, match=said):
-            raw(tmp_path / "b.mat", {"heights": HEIGHTS, "info": beside}, pixel=1.0)
+        refused(said, tmp_path / "b.mat", {"heights": HEIGHTS, "info": beside}, pixel=1.0)
     for named in (np.array(["µm"]), "µm".encode()):
         assert raw(several, sides | {"unit": named}).unit == "µm"
 
@@ -133,8 +136,7 @@ def test_matlab_with_axes(tmp_path: Path, form: str) -> None:
     surface = raw(tmp_path / "a.mat", arrays)
     assert_allclose(surface.pixel, (2, 3))
     assert_array_equal(surface.heights, HEIGHTS)
-    with pytest.raises(cr.InputError, match="as y and x require; transpose it"):
-        raw(tmp_path / "a.mat", arrays | {"z": arrays["z"].T})
+    refused("as y and x require; transpose it", tmp_path / "a.mat", arrays | {"z": arrays["z"].T})
 
 
 @pytest.mark.sample(3)
@@ -146,8 +148,7 @@ def test_bad_pixels(tmp_path: Path, mark: str, listed: bool) -> None:
     rows = zip(X.ravel(), Y.ravel(), cells.ravel(), strict=True) if listed else cells
     content = "".join(",".join(map(str, row)) + "\n" for row in rows)
     made, pixel = ("x,y,z\n" + content, None) if listed else (content, 1.0)
-    with pytest.raises(cr.ConvexroughError, match=r"2 holes .*--fill"):
-        raw(tmp_path / "a.txt", made, pixel=pixel)
+    refused(r"2 holes .*--fill", tmp_path / "a.txt", made, pixel=pixel, error=cr.ConvexroughError)
     filled = raw(tmp_path / "a.txt", pixel=pixel, fill=True)
     assert filled.filled == 2
     assert_allclose(np.delete(filled.heights, 3, 0), np.delete(HEIGHTS, 3, 0), atol=1e-9)
@@ -160,8 +161,8 @@ def test_the_only_sheet(tmp_path: Path) -> None:
         surface = raw(path, [[], sheet], pixel=1.0)
         assert_allclose(surface.heights, HEIGHTS)
         assert surface.source == f'{path}, sheet "Sheet1"'
-        with pytest.raises(cr.FileError, match='found cells in the sheets "Sheet", "Sheet1", exp'):
-            raw(path, [sheet, [["Pixel", 0.5]]], pixel=1.0)
+        two, said = [sheet, [["Pixel", 0.5]]], 'found cells in the sheets "Sheet", "Sheet1", exp'
+        refused(said, path, two, pixel=1.0, error=cr.FileError)
     beside = [[None, *row] for row in points]  # as from column B on
     assert_allclose(raw(path, [beside]).heights, HEIGHTS)
     titled = [["Surface map"], [], *HEIGHTS.tolist()]
@@ -286,8 +287,7 @@ def test_an_esri_grid(tmp_path: Path, width: int) -> None:
 def test_comments_may_hold_units_or_factors(tmp_path: Path, said: str) -> None:
     path, made = tmp_path / "map.txt", f"{said}\n{matrix()}"
     for known in ({}, {"pixel": 1.0}, {"pixel": 1.0, "unit": "µm"}, {"height_unit": "µm"}):
-        with pytest.raises(cr.InputError, match=rf"comments: found {re.escape(said)}, expected no"):
-            raw(path, made, **known)
+        refused(rf"comments: found {re.escape(said)}, expected no", path, made, **known)
     surface = raw(path, made, pixel=1.0, unit="µm", height_unit="µm")
     assert (surface.pixel, surface.comments) == ((1.0, 1.0), (said,))
 
@@ -315,12 +315,9 @@ METROPRO = bytes.fromhex("881b036f000100000342") + bytes(2000)
 def test_without_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "SurfaceTopography", None)
     said = r"a\.png: found \.png, expected a map in \.npy, .* needs SurfaceTopography: pip"
-    with pytest.raises(cr.FileError, match=said):
-        raw(tmp_path / "a.png", b"PNG")
-    with pytest.raises(cr.FileError, match=said.replace("png", "dat")):
-        raw(tmp_path / "a.dat", METROPRO)
-    with pytest.raises(cr.FileError, match=r"missing\.x3p: cannot be read: No such file"):
-        cr.surface.read(tmp_path / "missing.x3p")
+    refused(said, tmp_path / "a.png", b"PNG", error=cr.FileError)
+    refused(said.replace("png", "dat"), tmp_path / "a.dat", METROPRO, error=cr.FileError)
+    refused(r"missing\.x3p: cannot be read: No such", tmp_path / "missing.x3p", error=cr.FileError)
 
 
 @pytest.mark.skipif(
@@ -348,32 +345,30 @@ class TestInstruments:
     def test_masked_pixels_are_holes(self, tmp_path: Path) -> None:
         masked = np.ma.masked_array(HEIGHTS, X == 4)
         path = self.written(tmp_path / "a.x3p", masked)
-        with pytest.raises(cr.InputError, match=r"7 holes \(nan\) in 63 pixels"):
-            raw(path)
+        refused(r"7 holes \(nan\) in 63 pixels", path)
         assert raw(path, fill=True).filled == 7
 
     def test_what_is_refused(self, tmp_path: Path) -> None:
-        with pytest.raises(cr.InputError, match=r"a\.nc: unit: found mm, expected µm, as the file"):
-            raw(self.written(tmp_path / "a.nc"), unit="mm")
-        with pytest.raises(cr.FileError, match=r"a\.bin: SurfaceTopography cannot read it"):
-            raw(tmp_path / "a.bin", b"\1\2\3" * 50)
-        with pytest.raises(cr.FileError, match="cannot be read: No such file"):
-            raw(tmp_path / "b.gwy")
+        refused(r"a\.nc: unit: found mm, expected µm", self.written(tmp_path / "a.nc"), unit="mm")
+        header = b"fileformat = bcrstm\nheadersize = 99\nxpixels = 2\nypixels = 2\n"
+        for name, made, said in (
+            ("a.bin", b"\1\2\3" * 50, r"a\.bin: SurfaceTopography cannot read it"),
+            ("b.gwy", None, r"b\.gwy: cannot be read: No such file"),
+            ("a.bcr", header.ljust(200), r"cannot read it: KeyError\('xlength'\)"),
+        ):
+            refused(said, tmp_path / name, made, error=cr.FileError)
+
+    def test_of_several_maps_the_first_is_read(self, tmp_path: Path) -> None:
         held = self.written(tmp_path / "a.gwy").read_bytes()[21:]
         both = held + held.replace(b"/0/", b"/1/")
         gwy = b"GWYPGwyContainer\0" + len(both).to_bytes(4, "little") + both
         several = raw(tmp_path / "b.gwy", gwy, unit=None)
         assert several.source.split(", ", 1)[1].startswith("the first of its maps ")
-        header = b"fileformat = bcrstm\nheadersize = 99\nxpixels = 2\nypixels = 2\n"
-        with pytest.raises(cr.FileError, match=r"cannot read it: KeyError\('xlength'\)"):
-            raw(tmp_path / "a.bcr", header.ljust(200))
 
     def test_a_map_without_its_size(self, tmp_path: Path) -> None:
         """The unit of its heights is not that of the pixel that is given."""
         with import_module("h5py").File(tmp_path / "a.h5", "w") as file:
             file["surface"] = HEIGHTS.T
-        with pytest.raises(cr.InputError, match="pixel: found none, expected its size"):
-            raw(tmp_path / "a.h5")
+        refused("pixel: found none, expected its size", tmp_path / "a.h5")
         assert_array_equal(raw(tmp_path / "a.h5", pixel=1.0).heights, HEIGHTS)
-        with pytest.raises(cr.InputError, match="found none, expected the unit of the pixel, as h"):
-            raw(tmp_path / "a.dat", METROPRO, pixel=1.0)
+        refused("expected the unit of the pixel, as h", tmp_path / "a.dat", METROPRO, pixel=1.0)
