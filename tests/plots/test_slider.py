@@ -19,34 +19,32 @@ from convexrough.run.stages.normal import NormalStage
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 BROWSER = next((found for name in NAMES if (found := shutil.which(name))), None)
 
+CONTACT = cr.press(example.scene(), approach=example.APPROACH)
+LIMIT = 0.5 * CONTACT.load
+SPHERE = cr.smooth(CONTACT.scene, load=CONTACT.load)
+
 
 @pytest.fixture(scope="module")
-def contact() -> cr.Contact:
-    return cr.press(example.scene(), approach=example.APPROACH)
+def page() -> str:
+    pressed = NormalStage(approach=CONTACT.approach).compute(CONTACT)
+    return slider_html(CONTACT, pressed.lines())
 
 
-@pytest.fixture(scope="module")
-def page(contact: cr.Contact) -> str:
-    pressed = NormalStage(approach=contact.approach).compute(contact)
-    return slider_html(contact, pressed.lines())
-
-
-def test_states_are_those_of_shear_and_cycle(contact: cr.Contact, page: str) -> None:
+def test_states_are_those_of_shear_and_cycle(page: str) -> None:
     """In the data that the page carries; it needs nothing else, and is small."""
     assert not re.search(r"https?:|\burl\(|\bimport\b|<link|<img|\bsrc=|fetch\(", page)
     assert len(page.encode()) < 200_000  # of 1 MB
     (found,) = re.findall(r'id="data">(.*?)</script>', page, re.S)
-    data, limit = json.loads(found), 0.5 * contact.load
+    data = json.loads(found)
     states, discs = data["states"], data["discs"]
     assert states["fraction"] == [round(k / 100, 2) for k in range(101)]
-    a_H = cr.smooth(contact.scene, load=contact.load).contact_radius
-    touching = np.flatnonzero(contact.loads)
+    touching = np.flatnonzero(CONTACT.loads)
     assert discs["index"] == touching.tolist()
-    radii = contact.contact_radii[touching]
-    assert discs["radius"] == pytest.approx(radii / a_H, rel=1e-4)
+    radii = CONTACT.contact_radii[touching]
+    assert discs["radius"] == pytest.approx(radii / SPHERE.contact_radius, rel=1e-4)
     for k in (0, 7, 50, 83, 100):
-        state = cr.shear(contact, force=states["fraction"][k] * limit)
-        cycle = cr.cycle(contact, maximum=states["fraction"][k] * limit)
+        state = cr.shear(CONTACT, force=states["fraction"][k] * LIMIT)
+        cycle = cr.cycle(CONTACT, maximum=states["fraction"][k] * LIMIT)
         assert states["length"][k] == float(f"{state.displacement:.5g}")
         assert states["loss"][k] == float(f"{cycle.loss_normalised:.5g}")
         assert float(states["displacement_error"][k]) >= cycle.displacement_error
@@ -102,19 +100,17 @@ def near(values: Any) -> Any:
     return pytest.approx(values, rel=0.0, abs=1.5e-4 * np.abs(values).max())
 
 
-def assert_shown(shown: Opened, contact: cr.Contact, fraction: float, index: int) -> None:
+def assert_shown(shown: Opened, fraction: float, index: int = 36) -> None:
     """Every number in sight is Python's."""
-    limit = 0.5 * contact.load
-    state = cr.shear(contact, force=fraction * limit)
-    steady = cr.cycle(contact, maximum=fraction * limit)
-    sphere = cr.smooth(contact.scene, load=contact.load)
-    X0 = sphere.displacement(limit)
+    state = cr.shear(CONTACT, force=fraction * LIMIT)
+    steady = cr.cycle(CONTACT, maximum=fraction * LIMIT)
+    X0 = SPHERE.displacement(LIMIT)
     assert float(shown.text("fraction")) == fraction
-    share = state.forces[index] / (0.5 * contact.loads[index])
+    share = state.forces[index] / (0.5 * CONTACT.loads[index])
     for name, value in (
-        *(("q", fraction * limit), ("x", state.displacement), ("x_part", state.displacement / X0)),
+        *(("q", fraction * LIMIT), ("x", state.displacement), ("x_part", state.displacement / X0)),
         *(("w", steady.loss_normalised), ("w_smooth", steady.smooth_normalised)),
-        *(("load", contact.loads[index]), ("share", share)),
+        *(("load", CONTACT.loads[index]), ("share", share)),
         ("moved", state.displacements[index] / X0),
     ):
         assert shown.number(name) == float(f"{value:.5g}"), name
@@ -123,31 +119,29 @@ def assert_shown(shown: Opened, contact: cr.Contact, fraction: float, index: int
     assert shown.text("said").startswith(f"{slide} of 37 slide")
     assert shown.page.locator("#map circle.sliding").count() == slide
     status = {"partial": "partial slip"}.get(state.status[index], state.status[index])
-    assert (shown.text("status"), shown.text("state")) == (contact.status[index], status)
-    stick = state.stick_radii[index] / contact.contact_radii[index]
+    assert (shown.text("status"), shown.text("state")) == (CONTACT.status[index], status)
+    stick = state.stick_radii[index] / CONTACT.contact_radii[index]
     assert shown.number("stick") == pytest.approx(stick, abs=5e-4)
 
     # The loops: every point of them is where the force is sheared back and forth to it.
     moved, share = shown.points("#whole .line").T
-    past = cr.history(contact, forces=limit * share.clip(-fraction, fraction))
+    past = cr.history(CONTACT, forces=LIMIT * share.clip(-fraction, fraction))
     assert moved == near(past.displacements / X0)
     own_moved, own_share = shown.points("#own .line").T
-    assert own_share == near(past.asperity_forces[:, index] / (0.5 * contact.loads[index]))
+    assert own_share == near(past.asperity_forces[:, index] / (0.5 * CONTACT.loads[index]))
     assert own_moved == near(past.asperity_displacements[:, index] / X0)
     at = shown.page.locator("#whole .now").first.get_attribute("d")
     assert at == f"M{moved[0]:g} {share[0]:g}h0"
 
 
 @pytest.mark.skipif(BROWSER is None, reason=f"no browser to open the page in: none of {NAMES}")
-def test_the_keyboard_moves_the_force(opened: Opened, contact: cr.Contact) -> None:
+def test_the_keyboard_moves_the_force(opened: Opened) -> None:
     opened.page.keyboard.press("Tab")
     assert opened.page.evaluate("document.activeElement.id") == "force"
-    assert_shown(opened, contact, 0.5, 36)
-    for key, fraction in (("ArrowRight", 0.51), ("ArrowLeft", 0.5), ("PageDown", 0.4)):
+    assert_shown(opened, 0.5)
+    for key, fraction in (("ArrowRight", 0.51), ("ArrowLeft", 0.5), ("PageDown", 0.4), ("End", 1)):
         opened.page.keyboard.press(key)
-        assert_shown(opened, contact, fraction, 36)
-    opened.page.keyboard.press("End")
-    assert_shown(opened, contact, 1.0, 36)
+        assert_shown(opened, fraction)
     opened.page.keyboard.press("Home")
     assert opened.text("said") == "0 of 37 slide, 37 stick"
     said = opened.page.locator("#force").get_attribute("aria-valuetext")
