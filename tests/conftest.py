@@ -23,9 +23,7 @@ from convexrough import cli
 _approx = pytest.approx
 
 
-def _relative(
-    expected: Any, rel: float | None = None, abs: float | None = None, nan_ok: bool = False
-) -> Any:
+def _relative(expected: Any, rel: Any = None, abs: Any = None, nan_ok: bool = False) -> Any:
     """`pytest.approx` without its absolute tolerance of 1e-12: many losses are smaller."""
     if abs is None:
         rel, abs = 1e-6 if rel is None else rel, 0.0
@@ -86,15 +84,12 @@ class Outcome(NamedTuple):
 
 
 @pytest.fixture
-def command(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Any:
+def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any) -> Any:
     """Run the command line in an empty folder, in this process."""
     monkeypatch.chdir(tmp_path)
 
     def call(*arguments: str) -> Outcome:
-        status = cli.main(arguments)
-        return Outcome(status, *capsys.readouterr())
+        return Outcome(cli.main(arguments), *capsys.readouterr())
 
     return call
 

@@ -82,20 +82,14 @@ def test_certified_answers_never_exclude_each_other(
 
 
 def test_solvers_that_do_not_answer() -> None:
-    others = [
-        Sloppy(instead=cr.SolverError("sloppy: stopped")),
-        Sloppy(instead=cr.InputError("scene", found="this", expected="another")),
-        BristleQP(16),
-        Sloppy(instead=ValueError("boom")),
-        Sloppy(instead=5),
-    ]
+    refusal = cr.InputError("scene", found="this", expected="another")
+    instead = cr.SolverError("sloppy: stopped"), refusal, ValueError("boom"), 5
+    others = [*(Sloppy(instead=each) for each in instead), BristleQP(16)]
     entries = compare(paper(), approach=5e-5, solvers=others).entries[1:]
     said = [f"{entry.outcome} {entry.message}" for entry in entries]
-    assert said[:3] == [
-        *("failed sloppy: stopped", "refused scene: found this, expected another", "answered ")
-    ]
-    assert re.fullmatch(r"failed ValueError: boom \(test_compare\.py:\d+\)", said[3])
-    assert said[4] == "failed sloppy: returned int, expected a Solution"
+    assert said[:2] == ["failed sloppy: stopped", f"refused {refusal}"]
+    assert re.fullmatch(r"failed ValueError: boom \(test_compare\.py:\d+\)", said[2])
+    assert said[3:] == ["failed sloppy: returned int, expected a Solution", "answered "]
     for entry in entries[:2]:
         assert np.isnan(entry.disagreement)
         assert (entry.contact, entry.different_statuses, entry.memory) == (None, None, None)
@@ -243,6 +237,7 @@ def test_a_solver_of_ones_own_by_its_name(command: Any, tmp_path: Path, monkeypa
         (tmp_path / f"{module}.py").write_text(text)
     (tmp_path / "scene.toml").write_text(scene_text())
     one, two, three = ["newton", "mine"], ["newton", "newton (2)"], "newton + refinement"
+    ones = "Ones --solver desk.Refined"
     for line, status, names, said in (
         ("Mine", 0, one, "on import\non solving\n"),
         ("Zero", 3, None, "zero disagrees: its loads differ from those of newton by 1 of the larg"),
@@ -252,7 +247,7 @@ def test_a_solver_of_ones_own_by_its_name(command: Any, tmp_path: Path, monkeypa
         ("Spurious", 0, None, "same; 24 contacts differ"),
         ("Words", 4, None, "expected real numbers"),
         ("Far", 3, two, ""),
-        ("Ones --solver desk.Refined", 3, [*two, three], ""),
+        (ones, 3, [*two, three], ""),
     ):
         json_or_text = ["--json"] if names else []
         ran = command("compare", "scene.toml", "--solver", *f"desk.{line}".split(), *json_or_text)
@@ -272,9 +267,7 @@ def test_a_solver_of_ones_own_by_its_name(command: Any, tmp_path: Path, monkeypa
         wrong = command("compare", "scene.toml", "--solver", name)
         assert (wrong.status, wrong.out) == (2, "")
         assert re.search(pattern, wrong.err)
-    asked = (
-        "gallery few --json --profile --solver desk.Mine --solver desk.Ones --solver desk.Refined"
-    )
+    asked = f"gallery few --json --profile --solver desk.Mine --solver desk.{ones}"
     ran = command(*asked.split())
     profile = json.loads(ran.out)["profile"]
     assert (ran.status, [each["solver"] for each in profile]) == (3, [*one, two[1], three])
