@@ -14,7 +14,6 @@ SMALL = (("lattice", 61),)
 
 
 def test_command(command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It writes one run, of the smallest scenes."""
     monkeypatch.setattr(suite, "WORK", SMALL)
     monkeypatch.setattr(suite, "PRESSES", (*SMALL, ("scattered", 61)))
     monkeypatch.setattr(suite, "FOLLOWING", dict.fromkeys(suite.FOLLOWING, SMALL))

@@ -33,11 +33,6 @@ def pack(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.fixture(scope="module")
-def index(pack: Path) -> Any:
-    return json.loads((pack / "index.json").read_text())["cases"]
-
-
 def judged(name: str, about: Any, x: Any, near: float) -> None:
     """As the index says how, and by the certificate, whose statuses are held against the answer."""
     case = gallery.case(name)
@@ -48,19 +43,20 @@ def judged(name: str, about: Any, x: Any, near: float) -> None:
     assert true_statuses(case, cr.certify(case.scene, loads, **case.control).status)
 
 
-def program(index: Any, name: str, ending: str) -> Any:
-    found = index[name]["programs"].get(f"{name}.{ending}")
+def program(pack: Path, name: str, ending: str) -> Any:
+    case = json.loads((pack / "index.json").read_text())["cases"][name]
+    found = case["programs"].get(f"{name}.{ending}")
     if found is None:
         kind = "bristles" if ending.startswith("bristles") else "cones"
-        assert "convex" in index[name]["left_out"].get(kind, "convex"), name
+        assert "convex" in case["left_out"].get(kind, "convex"), name
     return found
 
 
 @pytest.mark.sample(3)
 @each_case
 @pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")  # how qpsolvers calls OSQP
-def test_bristle_programs(name: str, pack: Path, index: Any) -> None:
-    about = program(index, name, "bristles.npz")
+def test_bristle_programs(name: str, pack: Path) -> None:
+    about = program(pack, name, "bristles.npz")
     if about is None:
         return
     problem = qpsolvers.Problem.load(pack / f"{name}.bristles.npz")
@@ -82,9 +78,9 @@ def by_scs(P: Any, A: Any, b: Any, c: Any, equalities: int, sizes: list[int]) ->
 
 @pytest.mark.sample(3)
 @each_case
-def test_cone_programs_by_another_solver(name: str, pack: Path, index: Any) -> None:
+def test_cone_programs_by_another_solver(name: str, pack: Path) -> None:
     """By Clarabel's own reader, and by SCS, which takes the numbers of the same file."""
-    about = program(index, name, "cones.json")
+    about = program(pack, name, "cones.json")
     if about is None:
         return
     path = pack / f"{name}.cones.json"
@@ -110,9 +106,9 @@ def test_cone_programs_by_another_solver(name: str, pack: Path, index: Any) -> N
 @pytest.mark.parametrize("name", ["one", "two-equal", "load-1e-15", "convexity-bound-1-above",
                                   "convexity-solution-21-25-above", "ring-of-six",
                                   "grazing-load-1e-9", "shear-1e-12-of-all"])  # fmt: skip
-def test_cbf(name: str, pack: Path, index: Any) -> None:
+def test_cbf(name: str, pack: Path) -> None:
     """Through a reader of CBF that shares nothing with our writer."""
-    about = program(index, name, "cbf")
+    about = program(pack, name, "cbf")
     problem, (variables,), *_ = import_cbf(str(pack / f"{name}.cbf"))
     assert len(variables) == about["variables"]  # the last one is the quadratic term
     solvers = [name for name in ("cvxopt", "ecos") if find_spec(name)]  # ECOS has no wheel for 3.13

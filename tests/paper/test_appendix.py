@@ -21,11 +21,9 @@ from convexrough.sphere.smooth import smooth
 def slips(state: cr.ShearState) -> Any:
     """(n,) [length] slips of sliding asperities, 0 for others; positive along positive Q."""
     contact, adhered = state.contact, state.stick_radii > 0
-    touching = contact.loads > 0
-    u = np.zeros(len(contact.loads))  # surface displacement along the force
-    u[touching] = fields.shear_displacement(state, contact.scene.contact_points[touching])
+    u = fields.shear_displacement(state, contact.scene.contact_points)  # along the force
     stuck = u[adhered].mean() if adhered.any() else max(u, key=abs)
-    return np.where(touching & ~adhered, stuck - u, 0.0)
+    return np.where((contact.loads > 0) & ~adhered, stuck - u, 0.0)
 
 
 def cycle_energy(contact: cr.Contact, maximum: float) -> float:

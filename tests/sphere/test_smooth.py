@@ -160,15 +160,14 @@ def test_fields_of_each_asperity_integrate_to_its_forces(name: str, fraction: fl
     centres, a = contact.scene.contact_points[touching], contact.contact_radii[touching]
     c = state.stick_radii[touching]
     nodes, weights = np.polynomial.legendre.leggauss(24)
-    phi, weights = np.pi / 4 * (nodes + 1), np.pi / 4 * weights
+    phi, weights = np.pi / 4 * np.array([nodes + 1, weights])[:, :, None]
     forces, loads = np.zeros((2, len(a)))
     for inner, outer in ((0 * c, c), (c, a)):  # r^2 = outer^2 - (outer^2 - inner^2) cos^2(phi)
         squared = outer**2 - inner**2
-        for angle, weight in zip(phi, weights, strict=True):
-            r = np.sqrt(outer**2 - squared * np.cos(angle) ** 2)
-            points, ring = centres + r[:, None] * [0.6, 0.8], np.pi * squared * np.sin(2 * angle)
-            forces += weight * ring * fields.traction(state, points)
-            loads += weight * ring * fields.pressure(contact, points)
+        r = np.sqrt(outer**2 - squared * np.cos(phi) ** 2)
+        points, rings = centres + r[..., None] * [0.6, 0.8], np.pi * squared * np.sin(2 * phi)
+        forces += (weights * rings * fields.traction(state, points)).sum(axis=0)
+        loads += (weights * rings * fields.pressure(contact, points)).sum(axis=0)
     assert_allclose(forces, state.forces[touching], rtol=1e-7)
     assert_allclose(loads, contact.loads[touching], rtol=1e-7)
     assert forces.sum() == pytest.approx(state.force, rel=1e-7)
