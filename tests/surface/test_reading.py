@@ -4,6 +4,7 @@ import re
 import sys
 from importlib import import_module
 from importlib.util import find_spec
+from itertools import product
 from pathlib import Path
 from typing import Any
 from warnings import catch_warnings
@@ -139,19 +140,27 @@ def test_matlab_with_axes(tmp_path: Path, form: str) -> None:
     refused("as y and x require; transpose it", tmp_path / "a.mat", arrays | {"z": arrays["z"].T})
 
 
-@pytest.mark.sample(3)
-@pytest.mark.parametrize("mark", ["nan", "BAD", "-9999", "1.70141e38", "N/A", "#N/A", "77777"])
+#: Of holes, and where they are: two pixels, whole rows and columns.
+MARKS = ("nan", "BAD", "-9999", "1.70141e38", "N/A", "#N/A", "77777", "#NV", "---", "***", "")
+PLACES = (np.s_[3, 4:6], np.s_[3], np.s_[:, 3], np.s_[:, -1], np.s_[0])
+
+
+@pytest.mark.sample(6)
+@pytest.mark.parametrize("mark", MARKS)
 @pytest.mark.parametrize("listed", [False, True])
-def test_bad_pixels(tmp_path: Path, mark: str, listed: bool) -> None:
-    cells = np.array([[f"{each:.9f}" for each in row] for row in HEIGHTS], dtype=object)
-    cells[3, 4:6] = mark
-    rows = zip(X.ravel(), Y.ravel(), cells.ravel(), strict=True) if listed else cells
-    content = "".join(",".join(map(str, row)) + "\n" for row in rows)
-    made, pixel = ("x,y,z\n" + content, None) if listed else (content, 1.0)
-    refused(r"2 holes .*--fill", tmp_path / "a.txt", made, pixel=pixel, error=cr.ConvexroughError)
-    filled = raw(tmp_path / "a.txt", pixel=pixel, fill=True)
-    assert filled.filled == 2
-    assert_allclose(np.delete(filled.heights, 3, 0), np.delete(HEIGHTS, 3, 0), atol=1e-9)
+def test_holes(tmp_path: Path, mark: str, listed: bool) -> None:
+    separators, places = (",;\t ", PLACES) if mark else (",;\t", PLACES[:2])  # else empty lines
+    for separator, place in product(separators, places):
+        cells = np.array([[f"{each:.9f}" for each in row] for row in HEIGHTS], dtype=object)
+        cells[place] = mark
+        holes = cells == mark
+        points = np.column_stack([it.ravel().astype(str) for it in (X, Y, cells)])
+        rows = np.vstack((["x", "y", "z"], points)) if listed else cells
+        made = "\n".join(map(separator.join, rows))
+        refused(rf"found {holes.sum()} holes .*--fill", tmp_path / "a.txt", made, pixel=1.0)
+        filled = raw(tmp_path / "a.txt", pixel=1.0, fill=True)
+        assert_array_equal(filled.filled_pixels, holes)
+        assert_allclose(filled.heights[~holes], HEIGHTS[~holes], atol=1e-9)
 
 
 def test_the_only_sheet(tmp_path: Path) -> None:
@@ -176,19 +185,6 @@ def test_few_decimals_are_no_thousands(tmp_path: Path) -> None:
         heights = np.outer([1, 1, 1], np.float64(cells.split()))
         surface = raw(tmp_path / "a.txt", f"{cells} 7.5\n" * 3, pixel=1.0, fill=True)
         assert_array_equal(surface.heights[:, 0], heights[:, 0])
-
-
-def test_holes_of_whole_rows_and_columns_remain(tmp_path: Path) -> None:
-    for mark in ("#N/A", "#NV", "---", "***", "nan", ""):
-        for separator in (",", ";", "\t", " ")[: 4 if mark else 3]:
-            for place in (np.s_[3], np.s_[:, 3], np.s_[:, -1], np.s_[0]):
-                if mark or place == np.s_[3]:  # else separators at the end, or empty lines
-                    cells = np.array([[f"{each:.9f}" for each in row] for row in HEIGHTS], object)
-                    cells[place] = mark
-                    content = "\n".join(map(separator.join, cells))
-                    found = raw(tmp_path / "a.txt", content, pixel=1.0, fill=True)
-                    assert found.heights.shape == HEIGHTS.shape
-                    assert found.filled == (cells == mark).sum()
 
 
 HOLED = np.where(X == Y, np.nan, HEIGHTS)
