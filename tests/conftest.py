@@ -60,13 +60,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """Leave out the cases that are not drawn."""
     if config.option.full:
         return
-    cases: dict[str, list[pytest.Item]] = defaultdict(list)
+    cases: dict[tuple[str, int], list[pytest.Item]] = defaultdict(list)
     for item in items:
-        if item.get_closest_marker("sample"):
-            cases[item.nodeid.partition("[")[0]].append(item)
+        if sample := item.get_closest_marker("sample"):
+            cases[item.nodeid.partition("[")[0], *sample.args].append(item)
     left_out: set[pytest.Item] = set()
-    for test, found in cases.items():
-        many = next(found[0].iter_markers("sample")).args[0]
+    for (test, many), found in cases.items():
         random.Random(f"{config.option.seed} {test}").shuffle(found)
         left_out |= {*found[many:]}
     config.hook.pytest_deselected(items=[item for item in items if item in left_out])

@@ -120,8 +120,9 @@ def test_every_test_that_the_guarantees_name_is_there() -> None:
     assert named <= set(re.findall(r"^def (test_\w+)", tests, re.M))
 
 
-LONG = {"design.png", "design-fine.png"}
 DRAWING = runpy.run_path(str(ROOT / "docs/figures.py"))["drawings"]()
+#: Two of them take a minute and ten seconds: only with --full.
+DRAWN = dict.fromkeys(DRAWING, 1) | dict.fromkeys(("design.png", "design-fine.png"), 0)
 
 
 def test_one_command_draws_the_figures_of_the_pages() -> None:
@@ -130,17 +131,12 @@ def test_one_command_draws_the_figures_of_the_pages() -> None:
     assert {*DRAWING} | measured == {path.name for path in (ROOT / "docs/figures").iterdir()}
 
 
-@pytest.mark.parametrize("name", sorted(DRAWING.keys() - LONG))
-@pytest.mark.sample(1)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.sample(n)) for name, n in DRAWN.items()]
+)
 def test_each_figure_is_drawn(name: str, tmp_path: Path) -> None:
     DRAWING[name](tmp_path / name)
     assert (tmp_path / name).stat().st_size > 10_000
-
-
-@pytest.mark.sample(0)  # a minute and ten seconds: only with --full
-@pytest.mark.parametrize("name", sorted(LONG))
-def test_long_figures_are_drawn(name: str, tmp_path: Path) -> None:
-    test_each_figure_is_drawn(name, tmp_path)
 
 
 #: A turn of phrase that readers had to read twice, and what to write.
