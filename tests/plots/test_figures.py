@@ -210,8 +210,7 @@ def test_what_limits_shakedown_is_said() -> None:
     for part, kept in ((0.0, "open in every cycle"), (1.0, "keep sliding")):
         p, q = (1 - part) * swing, part * swing
         found = cr.shakedown(PAPER, load=P, load_amplitudes=p, force_amplitudes=q)
-        figure = plots.shakedown_figures(found)["shakedown"]
-        fits(figure)
+        fits(figure := plots.shakedown_figures(found)["shakedown"])
         assert figure.axes[0].get_title("left").endswith(f"\nringed: the first to {kept}")
         assert ("opens" in figure.axes[1].get_ylabel()) == ("open" in kept)
 
@@ -219,13 +218,11 @@ def test_what_limits_shakedown_is_said() -> None:
 def test_what_a_closed_path_settles_to() -> None:
     named = dataclasses.replace(PAPER, units=("µm", "mN"))
     found = cr.steady(named, loads=[0.9 * P, 0.5 * P], forces=[0.2 * P, -0.2 * P])
-    figure = plots.steady_figures(found)["steady"]
-    fits(figure)
+    fits(figure := plots.steady_figures(found)["steady"])
     plane, place = figure.axes
     pico = 1e-9  # of mN
-    dot = plane.lines[-1].get_xydata()
     expected = [[found.level / pico, found.force_level / (0.5 * pico)]]
-    assert_allclose(dot, expected, rtol=1e-12, atol=1e-9)
+    assert_allclose(plane.lines[-1].get_xydata(), expected, rtol=1e-12, atol=1e-9)
     for status in LOOKS:
         assert discs(place, status) == int((found.status == status).sum())
 
