@@ -75,7 +75,6 @@ def test_links_lead_somewhere() -> None:
 
 
 def test_every_concept_says_first_what_it_is_for() -> None:
-    """The first sentence of a page says what its reader will be able to do, or know."""
     for page in (ROOT / "docs/theory").glob("*.md"):
         _, opening = page.read_text("utf-8").split("\n\n")[:2]
         assert page.name == "index.md" or opening.startswith("After this page you "), page
@@ -216,12 +215,11 @@ def test_example(script: str) -> None:
 @pytest.mark.parametrize("script", LESSONS)
 def test_lesson(script: str, shown: list[int]) -> None:
     """Every claim holds, and a class that runs the script sees its picture in large letters."""
-    lesson = runpy.run_path(str(LESSONS[script]), run_name=script)
+    assert "compare" not in runpy.run_path(str(LESSONS[script]), run_name=script)
     assert LESSONS[script].read_text("utf-8").count("\nassert ") > 5
     assert shown == plt.get_fignums() == [1]
     assert plt.rcParams["font.size"] >= 14
     assert min(text.get_fontsize() for text in plt.figure(1).findobj(Text) if text.get_text()) > 10
-    assert "compare" not in lesson
 
 
 def test_boundary_elements() -> None:

@@ -161,8 +161,7 @@ def test_manufactured_contacts_of_any_size(count: int) -> None:
     assert len(made.scene) == count
     assert np.array_equal(proof.status, np.where(made.loads > 0, "contact", "open"))
     assert proof.load_errors.max() < 1e-8 * made.loads.max()
-    again = gallery.manufactured(count)
-    assert np.array_equal(again.loads, made.loads)
+    assert np.array_equal(gallery.manufactured(count).loads, made.loads)
     assert not np.array_equal(gallery.manufactured(count, seed=1).loads, made.loads)
     with pytest.raises(cr.InputError, match="a whole number, at least 1"):
         gallery.manufactured(count - 20_001)

@@ -236,8 +236,7 @@ def test_unknown_wear_is_grey() -> None:
     unknown = np.isnan(worn.slip_amplitudes[worn.contact.loads > 0])
     grey = np.asarray(to_rgba(UNKNOWN))
     assert ((np.asarray(drawn.get_facecolor()) == grey).all(axis=1) == unknown).all()
-    nothing = dataclasses.replace(worn, slip_amplitudes=np.full(len(PAPER), np.nan))
-    figure = nothing.plot().figure
+    figure = dataclasses.replace(worn, slip_amplitudes=np.full(len(PAPER), np.nan)).plot().figure
     assert len(figure.axes) == 1  # no colour bar
     assert [text.get_text() for text in texts(figure)].count("not known") == 1
 

@@ -26,8 +26,7 @@ SPHERE = cr.smooth(CONTACT.scene, load=CONTACT.load)
 
 @pytest.fixture(scope="module")
 def page() -> str:
-    pressed = NormalStage(approach=CONTACT.approach).compute(CONTACT)
-    return slider_html(CONTACT, pressed.lines())
+    return slider_html(CONTACT, NormalStage(approach=CONTACT.approach).compute(CONTACT).lines())
 
 
 def test_states_are_those_of_shear_and_cycle(page: str) -> None:

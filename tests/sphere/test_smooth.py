@@ -120,8 +120,7 @@ def cerruti(r: float, angle: float, nu: float, a: float, q0: float) -> float:
     half = np.arcsin(min(a / r, 1.0)) if r > 0 else np.pi / 2  # directions that meet the disc
 
     def along_a_line(w: float) -> float:
-        nearest = r * np.sin(w)
-        line = q0 * np.pi * max(a**2 - nearest**2, 0.0) / (2 * a)
+        line = q0 * np.pi * max(a**2 - (r * np.sin(w)) ** 2, 0.0) / (2 * a)
         return float(line * (1 - nu + nu * np.cos(angle + w) ** 2) / (np.pi * G))
 
     return float(quad(along_a_line, -half, half, epsabs=0, epsrel=1e-10)[0])

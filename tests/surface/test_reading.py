@@ -60,8 +60,7 @@ def test_arrays(tmp_path: Path) -> None:
         assert_allclose(surface.pixel, (2.0, 3.0))
     microns = {"pixel": 1.0, "unit": "µm"}
     for name in ("height_nm", "Z_nm", "topography in nm"):
-        found = raw(several, microns | {name: 1e3 * HEIGHTS})
-        assert_allclose(found.heights, HEIGHTS, rtol=1e-14)
+        assert_allclose(raw(several, microns | {name: 1e3 * HEIGHTS}).heights, HEIGHTS, rtol=1e-14)
     more = {"scale": 0.5, "z_unit": "nm", "ok": HEIGHTS > 0, "log": np.zeros(3), "note": "in nm"}
     nano = microns | {"height_nm": HEIGHTS, "height_unit": "µm"}
     for arrays, said in (
@@ -337,8 +336,7 @@ class TestInstruments:
         assert_allclose(surface.heights, scale * HEIGHTS, rtol=1e-6, atol=1e-7 * scale)
 
     def test_masked_pixels_are_holes(self, tmp_path: Path) -> None:
-        masked = np.ma.masked_array(HEIGHTS, X == 4)
-        path = self.written(tmp_path / "a.x3p", masked)
+        path = self.written(tmp_path / "a.x3p", np.ma.masked_array(HEIGHTS, X == 4))
         refused(r"7 holes \(nan\) in 63 pixels", path)
         assert raw(path, fill=True).filled == 7
 

@@ -85,8 +85,7 @@ def test_pressed_as_a_scene_says(find: Any) -> None:
     assert chosen["contacts"] == (contact.status == "contact").sum()
     assert_allclose(chosen["approach"], contact.approach, rtol=1e-9)
     assert found["crowded"] == []
-    first = found["trusted_from"]
-    later = [row for row in found["provability"] if row["prune"] >= first]
+    later = [row for row in found["provability"] if row["prune"] >= found["trusted_from"]]
     assert {row["doubt"] for row in later if row["contacts"] >= 5} == {""}
     assert rows("scan-summits/provability.csv")[0]["prune"] == "0.0"
     assert json.loads(Path("scan-summits/summary.json").read_text()) == found
