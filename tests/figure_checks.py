@@ -17,8 +17,7 @@ def texts(figure: Figure) -> list[Text]:
             low, high = sorted(axis.get_view_interval())
             slack = 1e-9 * (high - low)
             ticks |= {label for tick in axis.get_major_ticks() for label in tick.findobj(Text)}
-            places = axis.get_majorticklocs()
-            for place, tick in zip(places, axis.get_major_ticks(), strict=True):
+            for place, tick in zip(axis.get_majorticklocs(), axis.get_major_ticks(), strict=True):
                 if low - slack <= place <= high + slack:
                     found += [tick.label1, tick.label2]
     others = [t for t in figure.findobj(Text) if isinstance(t, Text) and t not in ticks]

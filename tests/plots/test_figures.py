@@ -131,8 +131,7 @@ def test_the_path_passes_through_every_step() -> None:
     part, lost = spent[np.argmin(np.abs(spent[:, 0] - 0.75))]  # the force grows evenly in a step
     there = cr.history(done.contact, forces=[part * done.forces[0]])
     assert_allclose(lost, there.losses[0] / sphere.energy_scale, rtol=1e-9)
-    numbers = {text.get_text() for text in path.texts}
-    assert numbers == {"1, 5", "2", "3", "4"}  # the loop closes on its first point
+    assert {text.get_text() for text in path.texts} == {"1, 5", "2", "3", "4"}  # the loop closes
 
 
 def test_what_cannot_be_drawn_is_refused() -> None:
@@ -234,8 +233,8 @@ def test_unknown_wear_is_grey() -> None:
     assert [text.get_text() for text in legend.texts] == ["not known"]
     (drawn,) = figure.axes[0].collections
     unknown = np.isnan(worn.slip_amplitudes[worn.contact.loads > 0])
-    grey = np.asarray(to_rgba(UNKNOWN))
-    assert ((np.asarray(drawn.get_facecolor()) == grey).all(axis=1) == unknown).all()
+    grey = (np.asarray(drawn.get_facecolor()) == to_rgba(UNKNOWN)).all(axis=1)
+    assert (grey == unknown).all()
     figure = dataclasses.replace(worn, slip_amplitudes=np.full(len(PAPER), np.nan)).plot().figure
     assert len(figure.axes) == 1  # no colour bar
     assert [text.get_text() for text in texts(figure)].count("not known") == 1
@@ -243,9 +242,8 @@ def test_unknown_wear_is_grey() -> None:
 
 def test_dark_styles_stay_legible() -> None:
     pressed = contact("paper")
-    done = past("paper", [0.6, -0.2])
     with style.context("dark_background"):
-        path = plots.path_figures(done)["history"].axes[0]
+        path = plots.path_figures(past("paper", [0.6, -0.2]))["history"].axes[0]
         verdict = plots.verdict_figures(cr.verify(pressed.scene, 0 * pressed.loads, load=1.0))
         dashed = pressed.plot().patches[0]
     assert path.texts[0].get_color() == "white"
@@ -278,15 +276,14 @@ def test_the_colours_and_the_profile_show_the_pressure() -> None:
 def test_the_curve_of_the_smooth_sphere_uses_the_area_of_a_cell() -> None:
     """That of the lattice, if the points were made on one; else the median of Voronoi's cells."""
     given = cr.Asperities(PAPER.asperities.positions, PAPER.asperities.tip_radii)
-    curves = []
-    for each in (PAPER.asperities, given):
+    few: Any = dict(spacing=0.0025, tip_radius=0.02, within=0.0025)  # hardly a cell is inside
+    small = cr.Asperities.hexagonal(**few), cr.Asperities.square(**few)
+    drawn = []
+    for each in (PAPER.asperities, given, *small):
         pressed = cr.press(dataclasses.replace(PAPER, asperities=each), approach=PAPER_APPROACH)
-        curves.append(plots.press_figures(pressed)["loads"].axes[0].lines[0].get_ydata())
-    assert_allclose(*curves, rtol=1e-12)
-    for small in (cr.Asperities.hexagonal, cr.Asperities.square):  # hardly a cell is inside
-        few = small(spacing=0.0025, tip_radius=0.02, within=0.0025)
-        pressed = cr.press(dataclasses.replace(PAPER, asperities=few), approach=PAPER_APPROACH)
-        assert len(plots.press_figures(pressed)["loads"].axes[0].lines) == 1
+        drawn.append(plots.press_figures(pressed)["loads"].axes[0].lines)
+    assert_allclose(drawn[0][0].get_ydata(), drawn[1][0].get_ydata(), rtol=1e-12)
+    assert [*map(len, drawn[2:])] == [1, 1]
 
 
 def test_files_keep_their_text_and_pixels(tmp_path: Path) -> None:
