@@ -279,8 +279,8 @@ def wolf(heights: Map) -> dict[Place, float]:
     summit = {}  # of the hill of each pixel: the way up from it ends there
     for place in sorted(np.ndindex(heights.shape), key=heights.item, reverse=True):
         summit[place] = summit.get(max(around(heights, place), key=heights.item), place)
-    left, gone = set(summit.values()), {}
-    while len(left) > 1:
+    gone: dict[Place, float] = {}
+    while len(left := set(summit.values())) > 1:
         saddles: dict[Place, tuple[float, Place]] = {}
         for one in np.ndindex(heights.shape):
             for other in around(heights, one):
@@ -290,7 +290,6 @@ def wolf(heights: Map) -> dict[Place, float]:
         least = min(left, key=lambda peak: heights[peak] - saddles[peak][0])
         level, taken_by = saddles[least]
         gone[least] = float(heights[least] - level)
-        left.remove(least)
         summit = {place: taken_by if it == least else it for place, it in summit.items()}
     assert list(gone.values()) == sorted(gone.values())  # so a threshold keeps the rest of them
     (last,) = left
