@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from flint import arb
+from flint import dirichlet_char
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from scenes import lattice_operator
+from scenes import LATTICES, lattice_operator
 
 from convexrough.arrays import Array
 from convexrough.influence.coupling import inverse_distances
@@ -14,24 +14,17 @@ from convexrough.influence.lattice import LEAST_NEGATIVE
 from convexrough.influence.lattice_symbol import LOST, TOLERANCE, _Symbol, least_symbol
 from convexrough.scene.lattice import Lattice, _shortest
 
-HEXAGONAL = np.array([[1.0, 0.0], [0.5, np.sqrt(0.75)]])
+HEXAGONAL = np.array(LATTICES["hexagonal"])
 SCALE = 0.37
-
-
-def half_line(power: arb, step: int, start: int) -> arb:
-    """sum over n >= 0 of (step n + start)^-power, continued."""
-    return arb(step) ** -power * power.zeta(arb(start) / step)
 
 
 def closed_forms() -> tuple[float, float]:
     """Epstein's sums of 1 / r at the corner: of the hexagonal and of the square lattice."""
-    s = arb(1) / 2
-    zeta = s.zeta(arb(1))
-    by_three = half_line(s, 3, 1) - half_line(s, 3, 2)
-    by_four = half_line(s, 4, 1) - half_line(s, 4, 3)
+    characters = (1, 1), (3, 2), (4, 3)
+    zeta, by_three, by_four = (dirichlet_char(*each).l(0.5).real for each in characters)
     # Every third site has the sign 1, the others -1/2: 3/2 times a lattice of 3^(1/2) the size.
-    hexagonal = 6 * zeta * by_three * (3 * 3**-s - 1) / 2
-    square = -4 * (1 - 2 ** (1 - s)) * zeta * by_four
+    hexagonal = 3 * zeta * by_three * (np.sqrt(3) - 1)
+    square = 4 * (np.sqrt(2) - 1) * zeta * by_four
     return float(hexagonal), float(square)
 
 
