@@ -160,6 +160,14 @@ def assert_honest(proof: cr.Certificate, loads: Any, exact: Any) -> None:
     compare("approach", [proof.approach_error], [proof.approach], [exact.approach])
 
 
+def assert_agree(one: Any, other: Any, *names: str) -> None:
+    """Loads, forces or what else of two results are within the errors of both."""
+    for name in names:
+        off = getattr(one, f"{name}s") - getattr(other, f"{name}s")
+        errors = sum(getattr(each.certificate, f"{name}_errors") for each in (one, other))
+        assert (np.linalg.norm(off.reshape(len(off), -1), axis=1) <= errors).all(), name
+
+
 def excess(scene: cr.Scene, loads: Array, exact: Any, total: float | None = None) -> float:
     """The energy of loads, in many digits scaled to a prescribed total, above that of `exact`."""
     with ctx.workdps(120):

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from friction_scenes import FRICTION, PAPER, lengths, pressed
+from friction_scenes import FRICTION, PAPER, pressed
 from numpy.testing import assert_allclose
 from scenes import NAMED, PAPER_APPROACH, hexagonal, paper, reference
-from status_audit import ATTACKS, assert_honest, attack
+from status_audit import ATTACKS, assert_agree, assert_honest, attack
 
 import convexrough as cr
 from convexrough import FrictionNewton, shear_vector
@@ -66,8 +66,7 @@ def test_digits_of_another_problem_are_not_used(control: Any) -> None:
         cr.shear(contact, force=0.1 * true.load)
         for contact in (cr.press(scene, **control, solver=elsewhere(1.0, 1 + 1e-6)), true)
     )
-    bounds = state.certificate.force_errors + known.certificate.force_errors
-    assert (np.abs(state.forces - known.forces) <= bounds).all()
+    assert_agree(state, known, "force")
 
 
 def put(value: float) -> Spoil:
@@ -143,7 +142,7 @@ def test_wrong_forces_are_never_called_right(field: str) -> None:
     contact = pressed("paper")
     force = 0.5 * FRICTION * contact.load
     truth = shear_vector(contact, force=force)
-    sliding, known = lengths(truth.slips) > 0, truth.certificate
+    sliding = truth.slips.any(axis=1)
 
     def spoil(values: Any, rng: np.random.Generator) -> Any:
         return values * (1 + 10.0 ** rng.uniform(-14, 1) * rng.standard_normal(values.shape))
@@ -151,10 +150,7 @@ def test_wrong_forces_are_never_called_right(field: str) -> None:
     for seed in range(12):
         liar = Liar(spoil, field, seed, FrictionNewton)
         state = shear_vector(contact, force=force, solver=liar)
-        proof = state.certificate
-        off = lengths(state.forces - truth.forces)
-        assert (off <= proof.force_errors + known.force_errors).all()
-        assert (lengths(state.slips - truth.slips) <= proof.slip_errors + known.slip_errors).all()
+        assert_agree(state, truth, "force", "slip")
         assert not (state.status[~sliding] == "sliding").any()
         assert not (state.status[sliding] == "partial").any()
 
@@ -182,8 +178,7 @@ def test_friction_after_small_loads_on_open_asperities() -> None:
     contact, true = cr.press(PAPER, **given, solver=residue), pressed("paper")
     assert (contact.loads > 0).all()
     state, known = (cr.shear(each, force=0.1 * true.load) for each in (contact, true))
-    bounds = state.certificate.slip_errors + known.certificate.slip_errors
-    assert (np.abs(state.slips - known.slips) <= bounds).all()
+    assert_agree(state, known, "slip")
     assert not state.displacements[state.status == "open"].any()
     onsets, right = cr.onset_of_sliding(contact), cr.onset_of_sliding(true)
     assert_allclose(onsets, right, rtol=1e-12)  # nan where open
