@@ -22,7 +22,6 @@ asperity must take up, its slip included, is eta (docs/theory/vector-friction.md
 method"). The state is the only one where the energy is convex, which is not tested here.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import inf, log2
@@ -214,27 +213,24 @@ def pulled(points: Array, loads: Array, i: int, scale: float) -> Balls:
         return -arb(scale) * inverse_sum(places, along, places[i], 3)
 
 
-def gaps(scene: Any, loads: Sequence[arb], approach: arb, rows: Iterable[int]) -> list[arb]:
+def gaps(scene: Any, loads: Balls, approach: arb, rows: Any) -> Balls:
     """k_i P_i^(2/3) + (A P)_i - D_i of some asperities of a scene, whatever the loads are."""
-    return [local + sunk - shape - approach for _, local, sunk, shape in _terms(scene, loads, rows)]
+    local, sunk, shape = _terms(scene, loads, rows)
+    return local + sunk - shape - approach
 
 
-def energy(scene: Any, loads: Sequence[arb], approach: arb) -> arb:
+def energy(scene: Any, loads: Balls, approach: arb) -> arb:
     """Phi(P) = sum P_i (3/5 k_i P_i^(2/3) + (A P)_i / 2 - D_i)."""
-    terms = _terms(scene, loads, range(len(loads)))
-    parts = [P * (3 * local / 5 + sunk / 2 - shape - approach) for P, local, sunk, shape in terms]
-    return sum(parts, ZERO)
+    local, sunk, shape = _terms(scene, loads, np.arange(len(loads)))
+    return (loads * (3 * local / 5 + sunk / 2 - shape - approach)).sum(initial=ZERO)
 
 
-def _terms(
-    scene: Any, loads: Sequence[arb], rows: Iterable[int]
-) -> Iterator[tuple[arb, arb, arb, arb]]:
-    """P_i, k_i P_i^(2/3), (A P)_i and d_i of some asperities."""
-    modulus = arb(float(scene.material.contact_modulus))
+def _terms(scene: Any, loads: Balls, rows: Any) -> tuple[Balls, Balls, Balls]:
+    """k_i P_i^(2/3), (A P)_i and d_i of some asperities."""
     points, shape, law = of_scene(scene)
-    for i in rows:
-        sunk = inverse_sum(points, np.array(loads), points[i]) / (arb.pi() * modulus)
-        yield loads[i], law[i] * cube_root(loads[i])[()] ** 2, sunk, shape[i]
+    sunk = np.array([inverse_sum(points, loads, points[i]) for i in rows])
+    scale = arb.pi() * arb(float(scene.material.contact_modulus))
+    return law[rows] * cube_root(loads[rows]) ** 2, sunk / scale, shape[rows]
 
 
 def off(values: Any, true: Any) -> Array:

@@ -59,11 +59,8 @@ def compare(stage: str, bounds: Any, values: Any, exact: Any) -> None:
     """Bound by bound, of numbers or vectors."""
     with ctx.workprec(BITS):
         for bound, value, true in zip(bounds, values, exact, strict=True):
-            balls = [true] if isinstance(true, arb) else true
-            pairs = zip(np.atleast_1d(value), balls, strict=True)
-            off = (arb(float(v)) - each for v, each in pairs)
-            square = sum((each * each for each in off), arb(0))
-            within = bound == np.inf or square <= arb(float(bound)) ** 2
+            off = multiprecision.exact(np.atleast_1d(value)) - np.atleast_1d(true)
+            within = bound == np.inf or (off * off).sum() <= arb(float(bound)) ** 2
             require(within, f"{stage} bound {bound} of {value}")
 
 
@@ -171,12 +168,10 @@ def assert_agree(one: Any, other: Any, *names: str) -> None:
 def excess(scene: cr.Scene, loads: Array, exact: Any, total: float | None = None) -> float:
     """The energy of loads, in many digits scaled to a prescribed total, above that of `exact`."""
     with ctx.workdps(120):
-        given = [arb(float(load)) for load in loads]
+        given, least = multiprecision.exact(loads), np.array(exact.loads)
         if total is not None:
-            given = [arb(total) * each / sum(given) for each in given]
-        one, other = (
-            multiprecision.energy(scene, each, exact.approach) for each in (given, exact.loads)
-        )
+            given = arb(total) * given / given.sum()
+        one, other = (multiprecision.energy(scene, P, exact.approach) for P in (given, least))
         return float((one - other).mid())
 
 
@@ -327,11 +322,8 @@ def _with_poisson(contact: cr.Contact, nu: float) -> cr.Contact:
 
 
 def report(tally: Tally) -> str:
-    lines = [
-        ", ".join(
-            f"{tally[it]:,} {it}" for it in ("tried", "refused", "unsolved", "unsolved vectors")
-        )
-    ]
+    outcomes = "tried", "refused", "unsolved", "unsolved vectors"
+    lines = [", ".join(f"{tally[it]:,} {it}" for it in outcomes)]
     for key in sorted(key for key in tally if len(key) == 2):
         undecided = 100 * tally[*key, "undecided"] / tally[key]
         lines.append(f"{' '.join(key)}: {tally[key]:,}, {undecided:.2f} % undecided")
