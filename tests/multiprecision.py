@@ -205,6 +205,16 @@ def inverse_sums(
         return high, (np.array(sums) - exact(high)).astype(float)
 
 
+def assert_sums(found: Any, points: Balls, loads: Any, rows: Any) -> float:
+    """Balls of the sums of P_j / r_ij in these rows hold the true ones; how far off any is."""
+    with ctx.workprec(400):
+        forces, off = exact(loads.high) + exact(loads.low), [ZERO]
+        for row in rows:
+            off.append(abs(middle(found[row]) - inverse_sum(points, forces, points[row])))
+            assert off[-1] <= arb(float(found.radius[row]))
+        return float(max(off).mid())
+
+
 def pulled(points: Array, loads: Array, i: int, scale: float) -> Balls:
     """The derivatives of scale sum_j P_j / r_ij with respect to the coordinates of point i."""
     with ctx.workprec(160):

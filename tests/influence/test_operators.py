@@ -17,7 +17,7 @@ import scenes
 from flint import arb, ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from multiprecision import exact, inverse_sum, inverse_sums, middle, of_scene, pulled, quotient
+from multiprecision import assert_sums, exact, inverse_sums, middle, of_scene, pulled, quotient
 
 import convexrough as cr
 from convexrough.arithmetic.balls import Ball
@@ -29,7 +29,6 @@ from convexrough.convex.newton_step import correct
 from convexrough.influence import couple, coupling, lattice, scattered
 from convexrough.influence.coupling import Coupling, Influence, JointCoupling, inverse_distances
 from convexrough.influence.dense import DenseInfluence
-from convexrough.influence.lattice import LatticeInfluence
 from convexrough.influence.pair_sums import Product
 from convexrough.influence.scattered import ScatteredInfluence
 from convexrough.influence.softened import Softened
@@ -195,7 +194,7 @@ def interrupted(points: Array, ask: Any, own: Any, other: Any, first: Any) -> It
 
 def test_threads_that_restrict_one_operator_at_once_get_their_own() -> None:
     points, own, other = scenes.lattice_patch(np.eye(2), 60), np.arange(40), np.arange(20, 60)
-    for part in interrupted(points, LatticeInfluence.restricted, own, other, first=other):
+    for part in interrupted(points, lattice.LatticeInfluence.restricted, own, other, first=other):
         assert (part.points == points[own]).all()
 
 
@@ -203,7 +202,7 @@ def test_threads_whose_loads_reach_unequally_far_get_their_own_sums() -> None:
     points = scenes.lattice_patch(scenes.turned(scenes.LATTICES["square"], 0.3), 60)
     near, everywhere = Pair.exact(np.eye(60)[0]), Pair.exact(np.ones(60))
     true = scenes.lattice_operator(points, SCALE).sums(near)
-    for found in interrupted(points, LatticeInfluence.sums, near, everywhere, first=near):
+    for found in interrupted(points, lattice.LatticeInfluence.sums, near, everywhere, first=near):
         assert (np.abs((found - true).value) <= found.radius + true.radius).all()
 
 
@@ -300,10 +299,8 @@ def test_far_from_the_origin_rounded_points_are_no_lattice() -> None:
 def test_shells_do_not_overlap(seed: int) -> None:
     """The premise of the shell lemma: s_i + s_j <= r_ij for all pairs, touching or not."""
     rng = np.random.default_rng(seed)
-    points = scenes.lattice_patch(
-        scenes.turned(scenes.LATTICES[sorted(scenes.LATTICES)[seed % 4]], 0.2), 300
-    )
-    points = rng.permutation(points)[:120] + rng.choice([0.0, 1e4])
+    basis = scenes.turned([*scenes.LATTICES.values()][seed % 4], 0.2)
+    points = rng.permutation(scenes.lattice_patch(basis, 300))[:120] + rng.choice([0.0, 1e4])
     touching = rng.random(120) < rng.random() ** 3
     radii = rng.lognormal(0, rng.choice([0.0, 0.0, 3.0]), 120) * touching
     inverse, share = inverse_distances(points, points), rng.choice([0.0, rng.random(), 1.0])
@@ -414,11 +411,7 @@ def test_sums_are_known(
     loads = Pair(high, high * 2.0**-54 * rng.uniform(-1, 1, count))
     operator = DenseInfluence.assemble(points, SCALE)
     found = operator.sums(loads)
-    ctx.dps = 120
-    for row in {0, *rng.integers(0, count, 5).tolist()}:
-        places = exact(points)
-        true = inverse_sum(places, exact(loads.high) + exact(loads.low), places[row])
-        assert abs(middle(found[row]) - true) <= arb(float(found.radius[row]))
+    assert_sums(found, exact(points), loads, {0, *rng.integers(0, count, 5).tolist()})
     most = float(operator.apply(np.abs(high)).max()) / SCALE
     if layout == "grid" and 1e-150 < most < 1e150:
         assert found.radius.max() <= (1e-25 if kind == "uneven" else 1e-26) * most
@@ -429,11 +422,9 @@ def test_sums_where_points_are_pairs() -> None:
     scene = scenes.rough("closest")
     loads = Pair.exact(np.random.default_rng(4).random(len(scene)))
     found = couple(scene, np.arange(len(scene)), SCALE).sums(loads)
-    ctx.dps = 60
-    points, _, _ = of_scene(scene)
-    for row in range(0, len(scene), 7):
-        true = inverse_sum(points, exact(loads.high), points[row])
-        assert abs(middle(found[row]) - true) <= arb(float(found.radius[row]))
+    with ctx.workprec(400):
+        points, _, _ = of_scene(scene)
+    assert_sums(found, points, loads, range(0, len(scene), 7))
     assert (found.radius < 1e-26 * found.value).all()
 
 
