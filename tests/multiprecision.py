@@ -41,6 +41,7 @@ ZERO: Balls = arb(0)
 ONE: Balls = arb(1)
 
 exact = np.vectorize(arb, otypes=[object])
+fractions = np.vectorize(Fraction, otypes=[object])
 mid = np.vectorize(arb.mid, otypes=[object])
 cube_root = np.vectorize(lambda ball: ZERO if ball == 0 else ball.root(3), otypes=[object])
 

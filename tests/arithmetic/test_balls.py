@@ -27,9 +27,8 @@ def numbers(draw: st.DrawFn) -> tuple[float, float, float]:
     """A midpoint (high, low) and a radius: of all sizes, at all distances from 0."""
     kind = draw(st.sampled_from(["plain"] * 6 + ["zero", "subnormal", "huge"]))
     high = draw(st.floats(1, 10)) * 10.0 ** draw(st.integers(-150, 150))
-    high = {"zero": 0.0, "subnormal": 5e-324 * int(draw(st.integers(1, 99))), "huge": 1e305}.get(
-        kind, high
-    ) * draw(st.sampled_from([-1, 1]))
+    sizes = {"zero": 0.0, "subnormal": 5e-324 * int(draw(st.integers(1, 99))), "huge": 1e305}
+    high = sizes.get(kind, high) * draw(st.sampled_from([-1, 1]))
     high, low = two_sum(high, high * 2.0**-54 * draw(st.sampled_from([0.0, -0.9, 0.3])))
     share = draw(st.sampled_from([0.0, 1e-30, 1e-17, 0.3, 1.0, 7.0, INF]))
     radius = share * abs(high) if high else draw(st.sampled_from([0.0, 1e-200, 1.0, INF]))

@@ -62,11 +62,8 @@ def test_digits_of_another_problem_are_not_used(control: Any) -> None:
     found = cr.press(scene, **control, solver=elsewhere(0.9))
     assert (found.status == true.status).all()
     assert found.load == pytest.approx(true.load, rel=1e-14)
-    state, known = (
-        cr.shear(contact, force=0.1 * true.load)
-        for contact in (cr.press(scene, **control, solver=elsewhere(1.0, 1 + 1e-6)), true)
-    )
-    assert_agree(state, known, "force")
+    other = cr.press(scene, **control, solver=elsewhere(1.0, 1 + 1e-6))
+    assert_agree(*(cr.shear(it, force=0.1 * true.load) for it in (other, true)), "force")
 
 
 def put(value: float) -> Spoil:
@@ -194,10 +191,9 @@ def test_friction_after_small_loads_on_open_asperities() -> None:
 def test_limits_and_derivatives_are_those_of_the_solution() -> None:
     """No derivatives, where nothing is proved to touch."""
     contact = cr.press(PAPER, load=3e-7, solver=unrefined(lambda loads: 2 * loads))
-    for call in (cr.shear, cr.cycle):
-        what = {"force" if call is cr.shear else "maximum": 0.4 * contact.load}
+    for call, name in ((cr.shear, "force"), (cr.cycle, "maximum")):
         with pytest.raises(cr.InputError, match=r"1\.6 f P: gross sliding\), expected at most f P"):
-            call(contact, **what)
+            call(contact, **{name: 0.4 * contact.load})
     turned = cr.press(PAPER, approach=PAPER_APPROACH, solver=unrefined(lambda loads: loads[::-1]))
     with pytest.raises(cr.SolverError, match="no asperity is proved to touch"):
         turned.gradient(load=1.0)

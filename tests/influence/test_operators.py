@@ -5,7 +5,6 @@ import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from fractions import Fraction
 from functools import partial
 from types import FrameType
 from typing import Any
@@ -17,7 +16,7 @@ import scenes
 from flint import arb, ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from multiprecision import assert_sums, exact, inverse_sums, middle, of_scene, pulled, quotient
+from multiprecision import assert_sums, exact, fractions, inverse_sums, middle, pulled, quotient
 
 import convexrough as cr
 from convexrough.arithmetic.balls import Ball
@@ -253,24 +252,16 @@ def test_many_points_of_a_lattice_are_exactly_on_their_sites(family: str, geomet
     assert array.layout.exact
     assert not fewer.layout.exact
     assert np.abs(array.positions[: len(fewer)] - fewer.positions).max() < 1e-12 * spacing
-    layout, points = array.layout, [[Fraction(x) for x in p] for p in array.positions.tolist()]
-    basis = [[Fraction(x) for x in row] for row in layout.lattice.basis.tolist()]
-    for site, point in zip(layout.sites.tolist(), points, strict=True):
-        for k in (0, 1):
-            assert sum(n * row[k] for n, row in zip(site, basis, strict=True)) == point[k]
+    layout, points = array.layout, fractions(array.positions)
+    assert (layout.sites.astype(object) @ fractions(layout.lattice.basis) == points).all()
     scene = cr.Scene(1e3, array, cr.Material(1.0, 0.3), geometry=geometry)
     A = NormalProblem.assemble(scene, approach=1.0, influence="lattice").influence
-    loads, (along, across) = rng.random(len(A)), A.lattice.shrink
-    found, places = A.sums(Pair.exact(loads)), [points[i] for i in A.members]
-    with ctx.workprec(160):
-        for i in rng.integers(0, len(A), 2).tolist():
-            true = arb(0)
-            for load, (x, y) in zip(loads.tolist(), places, strict=True):
-                apart = (along * (x - places[i][0])) ** 2 + (across * (y - places[i][1])) ** 2
-                if apart:
-                    true += load * quotient(apart).rsqrt()
-            off = middle(found[i]) - true
-            assert abs(float(off)) <= found.radius[i] <= 1e-21 * found.mid.high[i]
+    loads, (along, across) = Pair.exact(rng.random(len(A))), A.lattice.shrink
+    found = A.sums(loads)
+    with ctx.workprec(400):
+        places = [[quotient(along * x), quotient(across * y)] for x, y in points[A.members]]
+    assert_sums(found, np.array(places), loads, rng.integers(0, len(A), 2))
+    assert (found.radius <= 1e-21 * found.mid.high).all()
 
 
 @pytest.mark.parametrize("name", scenes.LATTICES)
@@ -423,7 +414,7 @@ def test_sums_where_points_are_pairs() -> None:
     loads = Pair.exact(np.random.default_rng(4).random(len(scene)))
     found = couple(scene, np.arange(len(scene)), SCALE).sums(loads)
     with ctx.workprec(400):
-        points, _, _ = of_scene(scene)
+        points, _, _ = multiprecision.of_scene(scene)
     assert_sums(found, points, loads, range(0, len(scene), 7))
     assert (found.radius < 1e-26 * found.value).all()
 

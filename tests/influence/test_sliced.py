@@ -6,7 +6,7 @@ from math import ceil, floor, log2, prod
 import numpy as np
 import pytest
 from flint import arb, ctx
-from multiprecision import assert_sums, exact, quotient
+from multiprecision import assert_sums, exact, fractions, quotient
 from numpy.typing import NDArray
 from scenes import LATTICES, disc, lattice_operator, lattice_patch, loadings
 
@@ -116,9 +116,6 @@ def soft(kernel: Softened, squares: Fraction) -> arb:
         return 1 / quotient(squares).sqrt() ** kernel.power
     terms = exact_series(kernel.order, kernel.power)
     return quotient(sum((c * t**k for k, c in enumerate(terms)), Fraction(0))) / a**kernel.power
-
-
-fractions = np.vectorize(Fraction, otypes=[object])
 
 
 def weight(place: float, which: int, order: int) -> Fraction:

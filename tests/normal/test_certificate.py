@@ -117,9 +117,8 @@ def test_touching_to_rounding(steps: int) -> None:
 
 def test_touching_exactly_is_undecided() -> None:
     """Neither load nor gap: two asperities that first touch at approach 0, all numbers exact."""
-    contact = cr.press(
-        scenes.on_sphere([[0.0, 0.0], [0.5, 0.0]], heights=[0.0, 0.125]), approach=0.0
-    )
+    scene = scenes.on_sphere([[0.0, 0.0], [0.5, 0.0]], heights=[0.0, 0.125])
+    contact = cr.press(scene, approach=0.0)
     assert list(contact.status) == ["undecided", "undecided"]
     assert list(contact.loads) == [0.0, 0.0]
     assert not contact.certificate.all_proved
@@ -302,12 +301,11 @@ def test_random_points_are_judged_honestly(
     contact = cr.press(scene, approach=5e-5, influence=kind)
     off = 10.0**digits * np.random.default_rng(seed).standard_normal(count)
     wrong = np.where(contact.loads > 0, contact.loads * (1 + off), np.abs(off) * contact.load)
+    start = contact.loads + 1e-30 * contact.load
     for control in ({"approach": 5e-5}, {"load": contact.load}):
         found = cr.certify(scene, wrong, **control, influence=kind)
         try:
-            exact = scenes.solve_exactly(
-                scene, **control, start=contact.loads + 1e-30 * contact.load
-            )
+            exact = scenes.solve_exactly(scene, **control, start=start)
         except multiprecision.NotProved:
             continue
         near = multiprecision.off(contact.loads, exact.loads).max() < 1e-9 * contact.load
