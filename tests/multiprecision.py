@@ -407,11 +407,9 @@ def _problem(
     kernel = tangential_kernel(points, coupling(points, E), nu / (2 - nu))
     total = np.array([arb(float(each)) for each in force]) / friction
     q = exact(np.asarray(start)[touching].reshape(-1)) / friction
-    X = (
-        exact(displacement) / travel_of(friction, nu)
-        if np.isfinite(displacement).all()
-        else _near_the_limit(P, kernel, total)
-    )
+    X = exact(displacement) / travel_of(friction, nu)
+    if not np.isfinite(displacement).all():
+        X = _near_the_limit(P, kernel, total)
     eta = np.tile(X, len(P)) - kernel @ q
     unit = (X @ X).sqrt() / (total @ total).sqrt()
     return VectorMap(P, thresholds, kernel, total, mid(unit)), mid(np.concatenate((eta, X)))

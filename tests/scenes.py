@@ -48,8 +48,8 @@ def paper(geometry: Any = "summit") -> cr.Scene:
 
 def rough(geometry: Any = "summit") -> cr.Scene:
     """91 asperities with random heights and tip radii."""
-    heights_and_tips: Any = dict(height_std=1e-6, tip_radius_cv=0.1, seed=7)
-    return replace(hexagonal(within=0.0126, **heights_and_tips), geometry=geometry)
+    scene = hexagonal(within=0.0126, height_std=1e-6, tip_radius_cv=0.1, seed=7)
+    return replace(scene, geometry=geometry)
 
 
 def steel(geometry: Any = "summit") -> cr.Scene:
@@ -165,14 +165,11 @@ def _pressed(
     tip_radii = (crowding * np.pi / 4 * separation) ** 2 / approach * rng.lognormal(0, 0.2, count)
     sphere = float(10.0 ** rng.uniform(0, 2)) / approach
     scale = float(10.0 ** rng.uniform(-6, 6))
-    heights = rng.normal(0, roughness, count) * approach
-    scene = cr.Scene(
-        sphere * scale,
-        cr.Asperities(points * scale, tip_radii * scale, heights * scale),
-        cr.Material(float(10.0 ** rng.uniform(-3, 12)), 0.3),
-        geometry="closest" if rng.random() < 0.5 else "summit",
-    )
-    return scene, approach * scale
+    asperities = cr.Asperities(points, tip_radii, rng.normal(0, roughness, count) * approach)
+    material = cr.Material(float(10.0 ** rng.uniform(-3, 12)), 0.3)
+    geometry: Any = "closest" if rng.random() < 0.5 else "summit"
+    scene = cr.Scene(sphere, asperities, material, None, geometry)
+    return scaled(scene, scale, 1.0), approach * scale
 
 
 @st.composite
@@ -268,7 +265,6 @@ def lattice_operator(
 ) -> LatticeInfluence:
     """The operator of points on a lattice, which is found if it is not given."""
     lattice = lattice or Lattice.through(points)
-    assert lattice is not None
     sites = lattice.sites(points)
     assert sites is not None
     layout = Layout(points, (lattice, sites))

@@ -258,7 +258,6 @@ def _audit_history(contact: cr.Contact, full: Any, force: float, there: Friction
             inner = slid_from(contact, full, (arb(force) - arb(-0.25 * force)) / 2)
         except Dragged:
             return
-        assert inner is not None  # below the force that is
         far = there.displacement
         rises = [far, far - 2 * inner.displacement, far, -far]
         once, back = there.energy / 4, inner.energy / 2

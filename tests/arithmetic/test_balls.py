@@ -64,18 +64,12 @@ def many_bits() -> Any:
 
 
 some = st.lists(numbers(), min_size=6, max_size=6)
+operations = st.sampled_from([operator.add, operator.sub, operator.mul, operator.truediv])
 
 
 @settings(max_examples=80, deadline=None)
-@given(
-    some,
-    some,
-    st.sampled_from([operator.add, operator.sub, operator.mul, operator.truediv]),
-    st.booleans(),
-)
-def test_arithmetic(
-    first: Any, second: Any, operation: Callable[[Any, Any], Any], near: bool
-) -> None:
+@given(some, some, operations, st.booleans())
+def test_arithmetic(first: Any, second: Any, operation: Any, near: bool) -> None:
     """Also of numbers that all but cancel."""
     x, y = balls(first), balls(second)
     if near:

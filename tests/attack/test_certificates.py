@@ -33,10 +33,9 @@ def inside(tip: float, share: float) -> cr.Contact:
     return contact
 
 
-CROWDED = [(around, 4.0), (around, 3.5), (lambda P: cr.press(shaded(), load=P), 3.0)]
-
-
-@pytest.mark.parametrize(("make", "load"), CROWDED)
+@pytest.mark.parametrize(
+    ("make", "load"), [(around, 4.0), (around, 3.5), (lambda P: cr.press(shaded(), load=P), 3.0)]
+)
 def test_losses_where_order_fails(make: Any, load: float) -> None:
     """Bristles are good to 1e-7 of the largest force and 1e-5 of the loss here, and the forces are
     2e-6 off, or more, and the loss 2e-4.
@@ -336,11 +335,9 @@ def test_sides_of_a_tie_where_one_side_does_not_exist(off: float) -> None:
 def test_derivatives_by_loads_that_differ_by_rounding() -> None:
     scene, P = cr.Scene(1.0, PAPER.asperities, MATERIAL, 0.5), 3.3e-7
     forces = 0.5 * P * np.array([0.1, 0.05, 0.1, 0.2])
-    first, second = (
-        cr.load_path(scene, loads=P * np.array([0.5, each, 0.3, 0.9]), forces=forces).gradient()
-        for each in (0.1 + 0.2, 0.3)
-    )
-    np.testing.assert_allclose(first.loads, second.loads, rtol=0, atol=1e-16)
+    loads = (P * np.array([0.5, each, 0.3, 0.9]) for each in (0.1 + 0.2, 0.3))
+    one, other = (cr.load_path(scene, loads=each, forces=forces).gradient() for each in loads)
+    np.testing.assert_allclose(one.loads, other.loads, rtol=0, atol=1e-16)
     ended = cr.load_path(scene, loads=[P, 0], forces=[0.05 * P, 0]).gradient()
     assert ended.forces[0] == 0
 

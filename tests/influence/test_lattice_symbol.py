@@ -57,8 +57,7 @@ def test_no_piece_of_a_lattice_has_less(basis: Array, seed: int) -> None:
         return
     rng = np.random.default_rng(seed)
     across = max(1, round(24 / np.hypot(*basis[1])))
-    i, j = np.divmod(np.arange(400), across)
-    sites = np.stack((i, j), axis=1) @ basis
+    sites = np.stack(np.divmod(np.arange(400), across), axis=1) @ basis
     for taken in (np.arange(400), rng.choice(400, 120, replace=False), np.arange(7)):
         points = sites[taken]
         assert np.linalg.eigvalsh(inverse_distances(points, points))[0] > bound

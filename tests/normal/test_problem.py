@@ -68,11 +68,8 @@ def test_a_close_pair_does_not_make_candidates_of_all(kind: Kind) -> None:
     regular = cr.Asperities.square(spacing=0.0025, tip_radius=0.002, within=0.04).positions
     regular = regular + np.random.default_rng(0).uniform(-0.3, 0.3, regular.shape) * 0.0025
     points = np.vstack((regular, regular[np.argmin(np.hypot(*regular.T))] + [1e-9, 0.0]))
-    bounds = [
-        highest_approach(cr.Scene(1.0, cr.Asperities(each, 0.002), scenes.MATERIAL), 1e-7, kind)
-        for each in (regular, points)
-    ]
-    assert bounds[1] <= 1.05 * bounds[0]
+    usual, more = (scenes.on_sphere(each, 0.002) for each in (regular, points))
+    assert highest_approach(more, 1e-7, kind) <= 1.05 * highest_approach(usual, 1e-7, kind)
 
 
 @pytest.mark.parametrize("kind", [None, "dense", "scattered"])

@@ -138,8 +138,8 @@ def edited(whole: cr.Scene, *, most: float = 0.0, raised: Any = 0.0) -> cr.Scene
 
 def sparse(whole: cr.Scene) -> cr.Scene:
     a, rng = whole.asperities, np.random.default_rng(5)
-    near = a.distances < 3e-3  # where a lattice is looked for
-    kept = near | (rng.random(len(whole)) < 0.6)
+    # All those near the axis, where a lattice is looked for.
+    kept = (a.distances < 3e-3) | (rng.random(len(whole)) < 0.6)
     few = cr.Asperities(a.positions[kept], a.tip_radii[kept], a.heights[kept])
     return replace(whole, asperities=few)
 
@@ -206,9 +206,6 @@ def test_the_start_is_good() -> None:
     """Two approaches at which rings that begin on a smooth sphere fail, and a flat."""
     fine = finer(12)
     flat = replace(hexagonal(0.0025 / 9, 0.004 / 9, 0.012), sphere_radius=np.inf)
-    for pressed, approach in (
-        (fine, 4.147157190635452e-05),
-        (fine, 4.79933110367893e-05),
-        (flat, 2e-4),
-    ):
+    cases = (fine, 4.147157190635452e-05), (fine, 4.79933110367893e-05), (flat, 2e-4)
+    for pressed, approach in cases:
         assert cr.press(pressed, approach=approach).iterations <= 5
