@@ -489,14 +489,11 @@ def _solved(scene: Any, radii: list[list[str]], control: Any) -> Reference:
     a = np.array([sum(map(float.fromhex, radius)) for radius in radii])
     modulus, sphere = float.fromhex(scene["contact_modulus"]), scene["sphere_radius"]
     along = tuple(map(float.fromhex, sphere if isinstance(sphere, list) else [sphere] * 2))
-    read = SimpleNamespace(
-        asperities=SimpleNamespace(positions=np.stack([x, y], 1), tip_radii=tips, heights=heights),
-        material=SimpleNamespace(contact_modulus=modulus),
-        sphere_radius=along,
-        geometry=scene["geometry"],
-    )
+    asperities = SimpleNamespace(positions=np.stack([x, y], 1), tip_radii=tips, heights=heights)
+    material, geometry = SimpleNamespace(contact_modulus=modulus), scene["geometry"]
+    given = dict(asperities=asperities, material=material, sphere_radius=along, geometry=geometry)
     start = 4 * modulus * a**3 * (sum(1 / R for R in along) / 2 + 1 / tips) / 3
-    return solve(read, start=start, **control)
+    return solve(SimpleNamespace(**given), start=start, **control)
 
 
 def _number(text: str) -> arb:

@@ -142,29 +142,21 @@ def results(geometry: Literal["summit", "closest"]) -> Iterator[Any]:
     load, force, n = contact.load, 0.2 * contact.load, len(scene)
     weights = np.arange(n) - 0.4 * n
     assert contact.candidates == n
-    yield contact
-    yield contact.certificate
-    yield cr.onset_of_sliding(contact)
+    yield from (contact, contact.certificate, cr.onset_of_sliding(contact))
     yield cr.onset_gradient(contact, int(np.argmin(np.where(contact.loads > 0, contact.loads, 9))))
-    yield contact.gradient(loads=weights)
-    yield contact.gradient(gaps=weights)
-    state = cr.shear(contact, force=force)
-    yield state
-    yield state.gradient(forces=weights, slips=weights)
-    cycle = cr.cycle(contact, maximum=force)
-    yield cycle
-    yield cycle.loop(20)
-    yield cycle.gradient()
-    yield cr.fretting(cycle)
+    yield from (contact.gradient(loads=weights), contact.gradient(gaps=weights))
+    state, cycle = cr.shear(contact, force=force), cr.cycle(contact, maximum=force)
+    yield from (state, state.gradient(forces=weights, slips=weights))
+    yield from (cycle, cycle.loop(20), cycle.gradient(), cr.fretting(cycle))
     yield cr.certify_shear(contact, state.forces * (1 + 1e-9), force=force)
     yield cr.shear_vector(contact, force=force)
     for kind in ("exact", "elastic"):
         amplitudes = [0.05 * load, -0.05 * load]
         yield cr.shakedown(scene, load=load, force_amplitudes=amplitudes, kind=kind)
-    path: dict[str, Any] = dict(loads=[load, 0.8 * load], forces=[0.0, 0.15 * load])
-    yield cr.load_path(scene, **path)
-    yield cr.load_path(scene, general_steps=2, **path)
-    yield cr.steady(scene, loads=[load, 0.8 * load], forces=[0.1 * load, -0.1 * load])
+    loads, forces = [load, 0.8 * load], [0.0, 0.15 * load]
+    for steps in (None, 2):
+        yield cr.load_path(scene, loads=loads, forces=forces, general_steps=steps)
+    yield cr.steady(scene, loads=loads, forces=[0.1 * load, -0.1 * load])
 
 
 @pytest.mark.parametrize("geometry", ["summit", "closest"])

@@ -161,9 +161,8 @@ def test_a_solver_cannot_change_what_the_proof_uses() -> None:
 
     scaling: Any = SimpleNamespace(name="scaling", solve=solve)
     for kind in ("dense", "scattered"):  # a lattice computes its points anew
-        scene = replace(paper(), geometry="closest")
         with pytest.raises(ValueError, match="read-only"):
-            cr.press(scene, approach=PAPER_APPROACH, solver=scaling, influence=kind)
+            cr.press(paper("closest"), approach=PAPER_APPROACH, solver=scaling, influence=kind)
     problem = NormalProblem.assemble(paper(), approach=PAPER_APPROACH)
     for each in (problem.offsets, problem.coefficients, problem.shells, problem.influence.matrix):
         assert not each.flags.writeable

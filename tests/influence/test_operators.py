@@ -22,8 +22,7 @@ import convexrough as cr
 from convexrough.arithmetic.balls import Ball
 from convexrough.arithmetic.pairs import Pair, two_product
 from convexrough.arrays import Array
-from convexrough.bench.scenes import APPROACH
-from convexrough.bench.scenes import scene as bench_scene
+from convexrough.bench import scenes as bench
 from convexrough.convex.newton_step import correct
 from convexrough.influence import couple, coupling, lattice, scattered
 from convexrough.influence.coupling import Coupling, Influence, JointCoupling, inverse_distances
@@ -146,7 +145,7 @@ def test_steps_of_more_digits_than_single_precision_has(balanced: bool) -> None:
     """The equation of the step holds to 1e-9. The sum of the loads is kept to seven digits of the
     second part, which is below 1e-4 of the step.
     """
-    scene = bench_scene("lattice", 9.0)
+    scene = bench.scene("lattice", 9.0)
     random = np.random.default_rng(1)
     A = couple(scene, np.arange(len(scene)), SCALE)
     c = random.uniform(0.02, 0.2, len(scene)) * scene.asperities.lattice.spacing / SCALE
@@ -295,7 +294,10 @@ def test_shells_do_not_overlap(seed: int) -> None:
     touching = rng.random(120) < rng.random() ** 3
     radii = rng.lognormal(0, rng.choice([0.0, 0.0, 3.0]), 120) * touching
     inverse, share = inverse_distances(points, points), rng.choice([0.0, rng.random(), 1.0])
-    dense, mesh = DenseInfluence.assemble(points, SCALE), ScatteredInfluence(points, SCALE)
+    dense, mesh = (
+        DenseInfluence.assemble(points, SCALE),
+        ScatteredInfluence(points, SCALE),
+    )
     for A in (scenes.lattice_operator(points, SCALE), mesh, dense):
         with np.errstate(divide="ignore"):
             fitted, halves = SCALE / A.fitted_shells(radii, share), SCALE / A.shells
@@ -343,8 +345,8 @@ def test_gaps_on_a_lattice(geometry: Any, R: Any, shift: float | None) -> None:
     heights = 1e-6 * np.random.default_rng(4).standard_normal(len(lattice))
     asperities = cr.Asperities(lattice.positions + shift, 0.02, heights)
     scene = cr.Scene(R, asperities, cr.Material(0.7, 0.3), geometry=geometry)
-    contact = cr.press(scene, approach=APPROACH)
-    for control in ({"approach": APPROACH}, {"load": contact.load}):
+    contact = cr.press(scene, approach=bench.APPROACH)
+    for control in ({"approach": bench.APPROACH}, {"load": contact.load}):
         problem = NormalProblem.assemble(scene, influence="lattice", **control)
         loads = contact.loads[problem.candidates] / problem.units.force
         assert_gaps_known(problem, loads, limit=1e-19)
@@ -354,8 +356,8 @@ def test_gaps_on_a_lattice(geometry: Any, R: Any, shift: float | None) -> None:
 @pytest.mark.parametrize("geometry", ["summit", "closest"])
 def test_gaps_on_a_mesh_and_what_they_prove(geometry: Any) -> None:
     """Loads are then proved to eleven digits."""
-    scene = replace(bench_scene("scattered", 8.0), geometry=geometry)
-    problem = NormalProblem.assemble(scene, approach=APPROACH)
+    scene = replace(bench.scene("scattered", 8.0), geometry=geometry)
+    problem = NormalProblem.assemble(scene, approach=bench.APPROACH)
     assert problem.influence.name == "scattered"
     loads = Newton().solve(problem).loads
     assert_gaps_known(problem, loads, limit=2e-14 * problem.approach)
@@ -440,9 +442,7 @@ def test_upper_bounds_on_sums() -> None:
     product = Product.assemble(points, splitting, np.float64)
     inverse = inverse_distances(points, points) ** 3
     too_low = 0
-    for i in range(20):
-        strengths = np.zeros(len(points))
-        strengths[i] = 1.0
+    for i, strengths in enumerate(np.eye(300)[:20]):
         assert (product.above(strengths) >= inverse[i]).all()
         relative = product.rounding(strengths).relative
         low = product.apply(strengths) < (1 - relative) * inverse[i]

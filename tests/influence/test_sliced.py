@@ -79,21 +79,14 @@ def test_sums_against_ball_arithmetic(
     assert found.radius.max() < good * float(np.abs(loads.high).sum()) / unit
 
 
-def perturbed(seed: int, count: int) -> Array:
-    """Points of a lattice, off their sites by rounding and as much as is allowed."""
-    rng = np.random.default_rng(seed)
-    basis = np.array([[1.0, 0.1], [0.45, 0.8]]) * 1e-3
-    points = lattice_patch(basis, count) + rng.uniform(-1, 1, 2)
-    return np.asarray(points * (1 + rng.choice([-1, 0, 1], points.shape) * 2.0**-53))
-
-
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("slices", [2, 3, 4])
 def test_points_are_where_they_are(seed: int, slices: int) -> None:
-    """What points are off their sites is taken into account."""
-    points = perturbed(seed, 120)
-    A = lattice_operator(points, 1.0)
-    loads = Pair.exact(np.random.default_rng(seed).random(120))
+    """What points are off their sites, by rounding and what is allowed, is taken into account."""
+    rng, basis = np.random.default_rng(seed), np.array([[1.0, 0.1], [0.45, 0.8]]) * 1e-3
+    points = lattice_patch(basis, 120) + rng.uniform(-1, 1, 2)
+    points *= 1 + rng.choice([-1, 0, 1], points.shape) * 2.0**-53
+    A, loads = lattice_operator(points, 1.0), Pair.exact(rng.random(120))
     found = A.sums(loads, slices)
     bound = float(found.radius.max())
     assert bound < {2: 1e-4, 3: 1e-9, 4: 1e-10}[slices] * A.rounding(loads.high).each
