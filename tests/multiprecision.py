@@ -378,7 +378,7 @@ class VectorMap:
 
 
 def solve_vectors(
-    scene: Any, loads: list[Any], force: Any, start: Any, displacement: Any, digits: int = 50
+    scene: Any, loads: Any, force: Any, start: Any, displacement: Any, digits: int = 50
 ) -> VectorReference:
     """The friction state of the asperities with loads > 0, under the force (2,), to `digits`.
 
@@ -396,7 +396,7 @@ def solve_vectors(
 
 
 def _problem(
-    scene: Any, loads: list[Any], force: Any, start: Any, displacement: Any
+    scene: Any, loads: Any, force: Any, start: Any, displacement: Any
 ) -> tuple[VectorMap, Balls]:
     touching = [i for i, load in enumerate(loads) if load > 0]
     P = np.array([loads[i] for i in touching])

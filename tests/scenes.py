@@ -185,10 +185,11 @@ def random_scenes(
     )
 
 
+Case = tuple[cr.Scene, float, Kind]
+
+
 @st.composite
-def random_cases(
-    draw: st.DrawFn, crowding: float = 0.8, most: int = 24
-) -> tuple[cr.Scene, float, Kind]:
+def random_cases(draw: st.DrawFn, crowding: float = 0.8, most: int = 24) -> Case:
     """Scattered asperities or some on a lattice, and one of the operators that they allow."""
     make = draw(st.sampled_from([scattered, on_lattice]))
     scene, approach = draw(random_scenes(crowding, most, make))

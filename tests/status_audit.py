@@ -229,7 +229,9 @@ def _audit_shear(kind: str, contact: cr.Contact, full: Any, fraction: float, tal
             return
         forces = exact.forces if exact else [FRICTION * p for p in full.loads]
     state, cycle = cr.shear(contact, force=force), cr.cycle(contact, maximum=force)
-    vector = cr.shear_vector(_with_poisson(contact, 0.0), force=force)
+    # At nu = 0 the tensor is the scalar kernel, and the theorem holds for vectors along x.
+    scalar = replace(contact, scene=with_friction(contact.scene, nu=0.0))
+    vector = cr.shear_vector(scalar, force=force)
     for stage, found in (("shear", state), ("cycle", cycle), ("vector", vector)):
         for i, (status, load) in enumerate(zip(found.status, full.loads, strict=True)):
             slides = exact is None or exact.slips[i] > 0
@@ -278,7 +280,7 @@ def _audit_vectors(kind: str, contact: cr.Contact, full: Any, force: float, tall
     pair = size * np.array([np.cos(angle), np.sin(angle)])
     if np.hypot(*pair) > FRICTION * contact.load:
         pair *= 1 - 1e-15
-    tilted = _with_poisson(contact, float(rng.uniform(0.0, 0.5)))
+    tilted = replace(contact, scene=with_friction(contact.scene, nu=float(rng.uniform(0.0, 0.5))))
     audit_vectors(kind, tilted, full, pair, tally)
 
 
@@ -289,10 +291,9 @@ def audit_vectors(kind: str, tilted: cr.Contact, full: Any, pair: Any, tally: Ta
     for status, load in zip(state.status, full.loads, strict=True):
         require(status in ("open", "undecided") or load > 0, "tensor: status of an open asperity")
         require(status != "open" or not load > 0, "tensor: open of one that touches")
+    start = state.forces, state.displacement
     try:
-        true = solve_vectors(
-            tilted.scene, list(full.loads), pair, state.forces, state.displacement, DIGITS - 20
-        )
+        true = solve_vectors(tilted.scene, full.loads, pair, *start, DIGITS - 20)
     except multiprecision.NotProved:
         tally["unsolved vectors"] += 1
         return
@@ -313,11 +314,6 @@ def audit_vectors(kind: str, tilted: cr.Contact, full: Any, pair: Any, tally: Ta
     if np.isfinite(state.displacement).all():
         compare("tensor slip", proof.slip_errors[touching], state.slips[touching], slips)
         compare("tensor displacement", [proof.displacement_error], [state.displacement], far)
-
-
-def _with_poisson(contact: cr.Contact, nu: float) -> cr.Contact:
-    """At nu = 0 the tensor is the scalar kernel, and the theorem holds for vectors along x."""
-    return replace(contact, scene=with_friction(contact.scene, nu=nu))
 
 
 def report(tally: Tally) -> str:

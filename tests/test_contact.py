@@ -19,8 +19,6 @@ from convexrough.contact import levels_of
 from convexrough.influence import Kind
 from convexrough.scene import layout
 
-Case = tuple[cr.Scene, float, Kind]
-
 #: What is proved of the loads, over their error. Rounding of transforms is bounded in the 2-norm of
 #: all loads together, and the bound of each pass is far above what it loses: 750 to 2600 on these
 #: scenes, and 250 to 700 for matrices.
@@ -79,7 +77,7 @@ def test_statuses_do_not_depend_on_the_operator(name: str) -> None:
 
 @settings(max_examples=15, deadline=None)
 @given(scenes.random_cases(), st.floats(-3, 3), st.floats(-3, 3))
-def test_units_do_not_matter(sampled: Case, length: float, force: float) -> None:
+def test_units_do_not_matter(sampled: scenes.Case, length: float, force: float) -> None:
     """Lengths times lambda and moduli times mu: loads times lambda^2 mu, the same statuses."""
     scene, approach, kind = sampled
     lam, mu = 10**length, 10**force
@@ -93,7 +91,7 @@ def test_units_do_not_matter(sampled: Case, length: float, force: float) -> None
 
 @settings(max_examples=15, deadline=None)
 @given(scenes.random_cases(), st.integers(0, 2**32 - 1), st.floats(0, 6.28))
-def test_order_and_orientation_do_not_matter(sampled: Case, seed: int, angle: float) -> None:
+def test_order_and_orientation_do_not_matter(sampled: scenes.Case, seed: int, angle: float) -> None:
     scene, approach, kind = sampled
     a, order = scene.asperities, np.random.default_rng(seed).permutation(len(scene))
     points = scenes.turned(a.positions, angle)[order]

@@ -83,19 +83,11 @@ def test_arithmetic(first: Any, second: Any, operation: Any, near: bool) -> None
                 assert holds(found, i, operation(a, b))
 
 
-def _positive(x: arb) -> arb:
-    return x if x > 0 else arb(0)
-
-
-def _cube_root(x: arb) -> arb:
-    return x.root(3) if x > 0 else arb(0)
-
-
 FUNCTIONS: dict[str, Callable[[arb], arb]] = {
-    "positive_part": _positive,
-    "sqrt": lambda x: _positive(x).sqrt(),
-    "cbrt": _cube_root,
-    "two_thirds": lambda x: _cube_root(x) ** 2,
+    "positive_part": lambda x: x.max(0),
+    "sqrt": lambda x: x.max(0).sqrt(),
+    "cbrt": lambda x: x.max(0).root(3),
+    "two_thirds": lambda x: x.max(0).root(3) ** 2,
     "__neg__": lambda x: -x,
 }
 
@@ -117,7 +109,7 @@ def test_residual(k: Any, P: Any, v: Any, d: Any, D: Any) -> None:
     found = residual(*operands)
     for i in range(6):
         ks, Ps, vs, ds, Ds = (samples(each, i)[::2] for each in operands)
-        powers = [_cube_root(P) ** 2 for P in Ps]
+        powers = [P.max(0).root(3) ** 2 for P in Ps]
         for a, x, b, c, e in itertools.product(ks, powers, vs, ds, Ds):
             assert holds(found, i, a * x + b - c - e)
 

@@ -33,8 +33,6 @@ from convexrough.solvers import Newton
 from convexrough.solvers.newton import Pressing
 from convexrough.sphere import hertz
 
-Case = tuple[cr.Scene, float, Kind]
-
 
 def test_screening_drops_only_those_that_cannot_touch() -> None:
     # The ring at 4 spacings lies at D = 0 to rounding, and is kept.
@@ -46,7 +44,7 @@ def test_screening_drops_only_those_that_cannot_touch() -> None:
 
 @settings(max_examples=20, deadline=None)
 @given(scenes.random_cases(crowding=1.5), st.integers(0, 2**32 - 1))
-def test_the_approach_bound_holds_for_any_weights(sampled: Case, seed: int) -> None:
+def test_the_approach_bound_holds_for_any_weights(sampled: scenes.Case, seed: int) -> None:
     """No solution carries more than an asperity would alone; no load, a higher approach."""
     scene, approach, kind = sampled
     contact = cr.press(scene, approach=approach)
@@ -210,7 +208,7 @@ def test_low_sites_beside_large_contacts_are_no_candidates(sphere_radius: float)
 
 @settings(max_examples=8, deadline=None)
 @given(scenes.random_cases(crowding=0.99), st.integers(0, 2**32 - 1), st.floats(-6, 3))
-def test_newton_converges_from_any_start(sampled: Case, seed: int, size: float) -> None:
+def test_newton_converges_from_any_start(sampled: scenes.Case, seed: int, size: float) -> None:
     """On every convex scene, to the same answer."""
     scene, approach, kind = sampled
     contact = cr.press(scene, approach=approach)

@@ -129,18 +129,15 @@ def finer(k: float, within: float = 0.01, **rough: Any) -> cr.Scene:
     return hexagonal(0.0025 / k, 0.02 / k, within, **rough)
 
 
-def edited(whole: cr.Scene, *, most: float = 0.0, raised: Any = 0.0) -> cr.Scene:
-    """Each asperity moved sideways at random, and up."""
+def edited(
+    whole: cr.Scene, *, most: float = 0.0, raised: Any = 0.0, share: float = 1.0
+) -> cr.Scene:
+    """Each asperity moved sideways at random, and up; away from the axis only a share is left."""
     a, rng = whole.asperities, np.random.default_rng(6)
     places = a.positions + rng.uniform(-most, most, (len(whole), 2))
-    return replace(whole, asperities=cr.Asperities(places, a.tip_radii, a.heights + raised))
-
-
-def sparse(whole: cr.Scene) -> cr.Scene:
-    a, rng = whole.asperities, np.random.default_rng(5)
     # All those near the axis, where a lattice is looked for.
-    kept = (a.distances < 3e-3) | (rng.random(len(whole)) < 0.6)
-    few = cr.Asperities(a.positions[kept], a.tip_radii[kept], a.heights[kept])
+    kept = (a.distances < 3e-3) | (rng.random(len(whole)) < share)
+    few = cr.Asperities(places[kept], a.tip_radii[kept], (a.heights + raised)[kept])
     return replace(whole, asperities=few)
 
 
@@ -150,7 +147,7 @@ LARGE = {
     "rough": finer(6, height_std=1e-6, tip_radius_cv=0.1, seed=2),
     "closest": replace(finer(6, height_std=1e-6, seed=3), geometry="closest"),
     "screened": finer(6, within=0.02, height_std=1e-7, seed=4),
-    "sparse": sparse(finer(7, height_std=1e-7, seed=4)),
+    "sparse": edited(finer(7, height_std=1e-7, seed=4), share=0.6),
     "scattered": edited(finer(6, height_std=1e-6, seed=2), most=5e-5),
     "flat": replace(edited(finer(6, height_std=1e-6, seed=2), raised=-5e-5), sphere_radius=np.inf),
 }
