@@ -7,7 +7,6 @@ import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
 
 import pytest
 from threadpoolctl import threadpool_info
@@ -92,8 +91,7 @@ def end() -> None:
 def output_of(name: str) -> str:
     """What this function prints, in a process of its own, without threads and handlers of this."""
     program = [sys.executable, "-c", f"import test_threads; test_threads.{name}()"]
-    options: dict[str, Any] = dict(cwd=Path(__file__).parent, check=True, timeout=60, text=True)
-    return subprocess.run(program, stdout=subprocess.PIPE, **options).stdout
+    return subprocess.check_output(program, cwd=Path(__file__).parent, timeout=60, text=True)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="forks")

@@ -31,7 +31,6 @@ from convexrough.influence.pair_sums import Product
 from convexrough.influence.scattered import ScatteredInfluence
 from convexrough.influence.softened import Softened
 from convexrough.influence.splitting import Splitting
-from convexrough.normal.certificate import certificate_of, proved_near
 from convexrough.normal.problem import NormalProblem
 from convexrough.normal.refine import trial
 from convexrough.roundoff import ROUNDOFF
@@ -361,12 +360,10 @@ def test_gaps_on_a_mesh_and_what_they_prove(geometry: Any) -> None:
     assert problem.influence.name == "scattered"
     loads = Newton().solve(problem).loads
     assert_gaps_known(problem, loads, limit=2e-14 * problem.approach)
-    force = problem.units.force
-    given = problem.to_scene(loads) * force
-    level, start = proved_near(problem, given)
-    certificate = certificate_of(level, given, start)
+    given = problem.to_scene(loads) * problem.units.force
+    certificate = cr.certify(scene, given, approach=bench.APPROACH)
     assert certificate.scope == "local"
-    assert certificate.load_error < 1e-11 * loads.max() * force
+    assert certificate.load_error < 1e-11 * given.max()
 
 
 def test_a_lattice_shrunk_until_its_points_are_off_the_sites_is_refused() -> None:

@@ -193,8 +193,7 @@ def test_those_left_out_at_first_are_found(control: str) -> None:
     known = cr.press(pressed, approach=5e-5, influence="dense")
     assert known.certificate.all_proved
     assert (known.status[peaks] == "contact").any()
-    given: Any = {control: getattr(known, control)}
-    found = cr.press(pressed, **given, influence="lattice")
+    found = cr.press(pressed, **{control: getattr(known, control)}, influence="lattice")
     assert found.candidates > ALL_ITERATED
     assert_allclose(found.loads, known.loads, rtol=0, atol=1e-12 * known.loads.max())
 
