@@ -307,9 +307,8 @@ def audit_vectors(kind: str, tilted: cr.Contact, full: Any, pair: Any, tally: Ta
         travel, forces = travel_of(arb(FRICTION), nu), FRICTION * true.forces
         slips, far = travel * true.slips, [travel * true.displacement]
         if gross:
-            along = np.array([arb(each) for each in pair])
-            along = along / (along @ along).sqrt()
-            forces = FRICTION * np.outer([full.loads[i] for i in touching], along)
+            P, along = np.array(full.loads)[touching], multiprecision.exact(pair)
+            forces = FRICTION * np.outer(P, along / (along @ along).sqrt())
     compare("tensor force", proof.force_errors[touching], state.forces[touching], forces)
     if np.isfinite(state.displacement).all():
         compare("tensor slip", proof.slip_errors[touching], state.slips[touching], slips)
