@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import MATERIAL, PAPER_APPROACH, hexagonal, paper, scattered, twins
+from scenes import MATERIAL, PAPER_APPROACH, hexagonal, paper, prescribed, scattered, twins
 
 import convexrough as cr
 from convexrough.friction.verdict import verify_shear
@@ -26,11 +26,8 @@ def contact() -> cr.Contact:
 @cache
 def solved(seed: int, control: str) -> tuple[cr.Contact, dict[str, float]]:
     scene, approach = scattered(seed, 30, 0.2 + 0.02 * (seed % 25), [0.1, 0.3, 0.6][seed % 3])
-    contact = cr.press(scene, approach=approach)
-    if control == "load":
-        contact = cr.press(scene, load=contact.load)
-        return contact, {"load": contact.load}
-    return contact, {"approach": approach}
+    given = prescribed(scene, approach, control)
+    return cr.press(scene, **given), given
 
 
 def corrupted(contact: cr.Contact, kind: str, rng: Any) -> tuple[Any, set[int]]:
@@ -293,17 +290,17 @@ def test_nothing_to_prove() -> None:
 
 @pytest.mark.parametrize("control", ["approach", "load"])
 def test_two_that_agree(contact: cr.Contact, control: str) -> None:
-    prescribed = {control: getattr(contact, control)}
-    first = cr.press(paper(), **prescribed)
-    second = cr.press(paper(), **prescribed, solver=cr.solvers.BristleQP(newton_step=False))
+    given = {control: getattr(contact, control)}
+    first = cr.press(paper(), **given)
+    second = cr.press(paper(), **given, solver=cr.solvers.BristleQP(newton_step=False))
     assert_agree(first, second)
     assert_agree(first, second, within=1e-3)
-    assert_agree(second.loads, first, scene=paper(), **prescribed)
-    numbers = {name: np.float64(value) for name, value in prescribed.items()}
+    assert_agree(second.loads, first, scene=paper(), **given)
+    numbers = {name: np.float64(value) for name, value in given.items()}
     assert_agree(first, second.loads, scene=paper(), **numbers)
     message = failure(assert_agree, first, second, within=1e-6)
     assert message.startswith("first (newton) and second (bristles): loads differ by ")
     assert "expected 1e-06: asperities " in message
     for wrong in (1000 * first.loads, first.loads + first.loads.max(), first.loads[::-1]):
-        message = failure(assert_agree, first, wrong, scene=paper(), **prescribed)
+        message = failure(assert_agree, first, wrong, scene=paper(), **given)
         assert "expected 0.01: asperities " in message, message
