@@ -163,13 +163,11 @@ SMALL: dict[str, Any] = {
 
 def tables(**changed: Any) -> dict[str, Any]:
     """Those of SMALL, with the keys of some of them changed; None takes a table out."""
-    found = {name: {**table} for name, table in SMALL.items()}
-    for name, keys in changed.items():
-        if keys is None:
-            del found[name]
-        else:
-            found[name] = {**found.get(name, {}), **keys}
-    return found
+    return {
+        name: SMALL.get(name, {}) | changed.get(name, {})
+        for name in SMALL | changed
+        if changed.get(name, {}) is not None
+    }
 
 
 def sweeping(**keys: Any) -> dict[str, Any]:
@@ -211,5 +209,4 @@ def _equal(one: Any, other: Any) -> bool:
 
 
 def numbers(table: cr.SweepTable, *names: str) -> list[Any]:
-    columns = table.read(names)
-    return [np.asarray(columns[name]).tolist() for name in names]
+    return [column.tolist() for column in table.read(names).values()]

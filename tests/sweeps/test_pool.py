@@ -23,16 +23,20 @@ from scene_files import SMALL, same, sweeping, swept, tables, toml
 import convexrough as cr
 from convexrough.progress import logged
 from convexrough.sweeps import plan
-from convexrough.sweeps.folder import open_folder
 from convexrough.sweeps.plan import plan_of
 from convexrough.sweeps.sweep import dask, run
 
 #: Whatever ran before in this process, and whichever threads it left, nothing is forked.
 SPAWN = multiprocessing.get_context("spawn")
 
-MANY = tables(sweep={"seeds": 10, "measure": ["contact", "load"]})
-PLAN = plan_of(MANY, Path("sweep"))
-WHOLE = swept(MANY)
+CONTENTS = tables(sweep={"seeds": 16, "measure": ["contact", "load"]})
+PLAN = plan_of(CONTENTS, Path("sweep"))
+SCENES, PARTS = 64, 32
+
+
+@pytest.fixture(scope="module")
+def whole() -> cr.SweepTable:
+    return swept(CONTENTS)
 
 
 class Shuffled(Executor):
@@ -55,9 +59,9 @@ class Shuffled(Executor):
     [lambda: ThreadPoolExecutor(3), lambda: ProcessPoolExecutor(1, mp_context=SPAWN), Shuffled],
     ids=["threads", "processes of the user", "the last first"],
 )
-def test_executors(executor: Any) -> None:
+def test_executors(executor: Any, whole: cr.SweepTable) -> None:
     given = executor()
-    assert same(cr.sweep(MANY, executor=given), WHOLE)
+    assert same(cr.sweep(CONTENTS, executor=given), whole)
     given.shutdown()
 
 
@@ -117,11 +121,10 @@ def test_threads_of_linear_algebra_do_not_matter() -> None:
         sweep={"seeds": 2, "measure": ["load", "load_error", "approach"],
                "over": {"asperities.height_std": [1e-7]}},
     )  # fmt: skip
-    found = []
-    for threads in (1, 2):
-        with threadpool_limits(threads):
-            found.append(swept(many))
-    assert same(*found)
+    with threadpool_limits(1):
+        one = swept(many)
+    with threadpool_limits(2):
+        assert same(one, swept(many))
 
 
 @pytest.fixture(scope="module")
@@ -132,13 +135,12 @@ def cluster() -> Iterator[Any]:
         yield found
 
 
-def test_dask(cluster: Any) -> None:
+def test_dask(cluster: Any, whole: cr.SweepTable) -> None:
     with dask(cluster.scheduler_address) as engine:
-        assert same(run(PLAN, engine)[0], WHOLE)
+        assert same(run(PLAN, engine)[0], whole)
 
 
 def test_a_worker_of_dask_is_killed(cluster: Any, tmp_path: Path, whole: cr.SweepTable) -> None:
-    plan = plan_of(CONTENTS, Path("sweep"))
     killed: list[int] = []
 
     def kill(record: logging.LogRecord) -> None:
@@ -148,7 +150,7 @@ def test_a_worker_of_dask_is_killed(cluster: Any, tmp_path: Path, whole: cr.Swee
 
     workers = [each.pid for each in cluster.workers.values()]
     with dask(cluster.scheduler_address) as engine, logged(kill):
-        table = run(plan, engine, out=tmp_path / "a")[0]
+        table = run(PLAN, engine, out=tmp_path / "a")[0]
     assert killed
     assert same(table, whole)
     assert set(table.read(["status"])["status"]) == {"certified"}
@@ -170,15 +172,6 @@ def test_a_scheduler_that_does_not_answer() -> None:
         distributed.default_client()
 
 
-CONTENTS = tables(sweep={"seeds": 16, "measure": ["load"]})
-SCENES, PARTS = 64, 32
-
-
-@pytest.fixture(scope="module")
-def whole() -> cr.SweepTable:
-    return swept(CONTENTS)
-
-
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
     (tmp_path / "a.toml").write_text(toml(CONTENTS))
@@ -191,8 +184,7 @@ def kills(request: pytest.FixtureRequest) -> int:
 
 def rows(folder: Path) -> int:
     """How many scenes are there; each part of them whole."""
-    found = open_folder(folder / "a-sweep")
-    return sum(len(found.read(part)["scene"]) for part in found.parts())
+    return len(cr.open_sweep(folder / "a-sweep").read()["scene"])
 
 
 def resumed(folder: Path) -> cr.SweepTable:

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
 from scene_files import SMALL, numbers, same, sweeping, swept, tables, toml
 from scenes import hexagonal, paper
 
@@ -259,9 +258,9 @@ def test_a_figure_has_a_logarithmic_axis_for_decades_and_says_what_a_band_pools(
 
 
 def test_a_figure_of_names_joins_nothing() -> None:
-    over = {"asperities.geometry": ["summit", "closest"]}
-    random = {"asperities": {**SMALL["asperities"], "height_std": 1e-6}}
-    axes = swept({**sweeping(over=over, seeds=3, measure=["load"]), **random}).plot()
+    contents = sweeping(over={"asperities.geometry": ["summit", "closest"]}, seeds=3)
+    contents["asperities"]["height_std"] = 1e-6
+    axes = swept(contents).plot()
     assert [each.get_text() for each in axes.get_xticklabels()] == ["summit", "closest"]
     assert {each.get_linestyle() for each in axes.lines} == {"None"}
     assert [len(each.get_segments()) for each in axes.collections] == [2, 2]  # type: ignore[attr-defined]
@@ -380,7 +379,7 @@ def test_onset_is_the_least_force_at_which_the_fraction_slides() -> None:
     found = measured(contact, {}, ["onset"]).numbers
     for quarters in range(1, 5):
         least = onsets[-(-quarters * len(onsets) // 4) - 1]
-        assert_allclose(found["onset", f"{quarters / 4:g}"], least, rtol=1e-12)
+        np.testing.assert_allclose(found["onset", f"{quarters / 4:g}"], least, rtol=1e-12)
 
 
 def identity(contents: dict[str, Any], folder: Path = Path()) -> Any:
@@ -462,8 +461,6 @@ def test_values_of_together_are_checked_together() -> None:
     assert mistakes(paths([math.nan])).startswith(f"{places}: [path] forces[0]: found nan")
 
 
-ROUGH = {**SMALL["asperities"], "height_std": 1e-7}  # seeds are those of the sweep
-
 WRONG = [
     ({k: v for k, v in SMALL.items() if k != "sweep"}, "[sweep]: missing table"),
     (tables(sweep={"sede": 3}), '[sweep] sede: unknown key, did you mean "seeds"?'),
@@ -503,7 +500,8 @@ def test_mistakes(contents: dict[str, Any], said: str) -> None:
 
 def test_all_mistakes_are_told_at_once() -> None:
     wrong = sweeping(seeds=0, over={"load": [1.0], "normal.load": []})
-    wrong = {**wrong, "sphere": {"radius": -1}, "asperities": ROUGH}
+    wrong["sphere"]["radius"] = -1
+    wrong["asperities"]["height_std"] = 1e-7  # so that something is random
     said = mistakes(wrong).splitlines()
     assert [line.split(": ")[1] for line in said] == [
         "[sweep] seeds", "[sweep] over.normal.load", "[sweep] over.load", "[sphere] radius",
