@@ -14,7 +14,6 @@ from scene_files import EVERYTHING, FRICTION, WITHIN, rows, scene_text
 
 import convexrough as cr
 from convexrough.cli.common import progress
-from convexrough.run.scene_file import read_scene
 from convexrough.run.stages import STAGES
 
 
@@ -109,7 +108,7 @@ def test_a_run_says_what_the_package_says(run: Any, command: Any) -> None:
     verified = command("verify", "a.toml", "deep/er/asperities.csv", "--json")
     assert json.loads(verified.out)["normal"]["certificate"].keys() == proof.keys()
 
-    file = read_scene("a.toml")
+    file = cr.read_scene("a.toml")
     contact = file.press()
     assert contact.certificate.convexity_number == pytest.approx(0.504, abs=5e-4)
     assert contact.model_error == pytest.approx(0.002, abs=5e-4)
@@ -120,9 +119,8 @@ def test_a_run_says_what_the_package_says(run: Any, command: Any) -> None:
     assert counts == [[0, 37, 0], [6, 31, 0], [6, 31, 0]]
     half = cr.shear(contact, force=0.5 * limit)
     last = [row for row in rows(folder / "shear.csv") if float(row["fraction"]) == 0.5]
-    assert [float(row["force"]) for row in last] == list(half.forces)
-    assert [float(row["slip"]) for row in last] == list(half.slips)
-    assert [row["status"] for row in last] == list(half.status)
+    found = [(float(row["force"]), float(row["slip"]), row["status"]) for row in last]
+    assert found == [*zip(half.forces, half.slips, half.status, strict=True)]
     assert summary["shear"][2]["displacement"] == half.displacement
 
     cycles = rows(folder / "cycle.csv")
@@ -169,7 +167,7 @@ def test_a_file_with_a_sweep_is_swept(run: Any, command: Any) -> None:
     assert (ran.status, json.loads(ran.out)["sweep"]["certified"]) == (0, 2)
     found = cr.open_sweep("a-sweep").read()["load"]
     Path("one.toml").write_text(scene_text())
-    assert found[1] == read_scene("one.toml").press().load
+    assert found[1] == cr.read_scene("one.toml").press().load
     assert command("run", "a.toml", "--html").refuses("of one scene, not of a sweep")
     assert "[sweep]: only `convexrough sweep`" in command("compare", "a.toml").err
 
@@ -227,8 +225,7 @@ def test_a_stage_is_computed_written_and_printed(run: Any) -> None:
 
 @pytest.mark.usefixtures("added")
 def test_mistakes_of_a_stage_are_told(run: Any) -> None:
-    for more, said in (
-        (MORE + "quantiles = [2.0]", "[onset] quantiles[0]: found 2.0, expected a number from 0"),
-        ("[onset]", "[friction]: missing table, needed with [onset]"),
-    ):
-        assert run(scene_text(more=more)).refuses(said)
+    said = "[onset] quantiles[0]: found 2.0, expected a number from 0"
+    assert run(scene_text(more=MORE + "quantiles = [2.0]")).refuses(said)
+    said = "[friction]: missing table, needed with [onset]"
+    assert run(scene_text(more="[onset]")).refuses(said)

@@ -69,12 +69,10 @@ def test_what_is_only_checked_is_not_certified(read: Any) -> None:
     file = read(WITHIN, more=EVERYTHING)
     contact, said = file.press(), list[str]()
     with logged(lambda record: said.append(record.getMessage())):
-        results = file.compute(contact)
+        results = {result.name: result for result in file.compute(contact)}
     assert [f"[{name}]" for name in file.stages] == [it for it in said if it.startswith("[")]
-    assert all(result.certified for result in results)
-    results = [result for result in results if result.name in RESTING]
-    assert len(results) == len(RESTING)
-    for result in results:
+    assert all(result.certified for result in results.values())
+    for result in map(results.__getitem__, RESTING):
         for k, found in enumerate(result.found):
             wrong = {"order": "checked"} if result.name != "shakedown" else {"upper": np.inf}
             several = [*result.found]
@@ -141,7 +139,8 @@ def test_a_steady_state_of_which_nothing_is_proved(run: Any) -> None:
 # [gradient]
 
 
-def scene(table: str) -> str:
+def stage(table: str) -> str:
+    """A scene with friction and this table."""
     return scene_text(WITHIN, "load = 3.60853389e-7", FRICTION + table)
 
 
@@ -153,7 +152,7 @@ def printed(out: str) -> dict[str, str]:
 
 def test_what_is_written_and_printed(run: Any) -> None:
     """Names apart from numbers, what is held, how far heights are known, and what was asked by."""
-    text = scene('[gradient]\nof = "loss"\nfraction = 0.5\nby = ["heights", "positions"]\n')
+    text = stage('[gradient]\nof = "loss"\nfraction = 0.5\nby = ["heights", "positions"]\n')
     outcome = run(text, "--out", "out")
     assert outcome.status == 0, outcome.err
     assert "gradient of the loss at Q/(fP) = 0.5, at constant load and force" in outcome.out
@@ -179,7 +178,7 @@ def test_what_is_written_and_printed(run: Any) -> None:
     assert far[at] == far.max()
     assert lines["by position"].startswith(f"up to ({table['by_x'][at]:.8g}, ")
     assert "by tip_radius" not in lines
-    lines = printed(run(scene('[gradient]\nof = "approach"\nby = ["tip_radii"]\n')).out)
+    lines = printed(run(stage('[gradient]\nof = "approach"\nby = ["tip_radii"]\n')).out)
     assert "by height" not in lines
     assert lines["by friction"] == "0"
     assert lines["by tip_radius"].startswith("up to ")
@@ -189,7 +188,7 @@ def test_where_there_is_none(run: Any) -> None:
     """All else is computed and written; what is missing is said, and the status says so."""
     keys = 'of = "loss"\nfraction = 1.0\nholding = "approach"'
     said = "maximum: found 1.804266945e-07: gross sliding, expected a force below f P"
-    text = scene(f"[gradient]\n{keys}\n[cycle]\nmaximum_fraction = [0.5]\n")
+    text = stage(f"[gradient]\n{keys}\n[cycle]\nmaximum_fraction = [0.5]\n")
     outcome = run(text, "--out", "out")
     assert outcome.status == 3
     summary = json.loads(Path("out/summary.json").read_text())
@@ -263,11 +262,6 @@ def layout(keys: str, normal: str = "approach = 5e-5", more: str = "") -> str:
     """A scene with a hexagonal pattern and these keys."""
     tips = "" if "tip_radius = " in keys else "tip_radius = 0.02\n"
     return scene_text(f'pattern = "hexagonal"\n{tips}{keys}', normal, more)
-
-
-def stage(table: str) -> str:
-    """A scene with friction and this table."""
-    return scene_text(WITHIN, "load = 3.6e-7", FRICTION + table)
 
 
 VECTOR = '[shakedown]\nload = 1\nkind = "vector"\nforce_amplitudes = '
