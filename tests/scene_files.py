@@ -13,6 +13,7 @@ import pytest
 from scipy.io import savemat
 
 import convexrough as cr
+from convexrough.verdict.claims import Claimed, Manner, read_forces
 
 Columns = Mapping[str, Iterable[Any]]
 
@@ -137,10 +138,19 @@ def put(folder: Path, made: Any, name: str = "loads.csv") -> str:
             for row in sheet:
                 page.append(row)
         book.save(path)
+    elif kind == "parquet":
+        pytest.importorskip("pandas").DataFrame(made).to_parquet(path)
     else:
         content = (made if isinstance(made, str) else lines(made)).encode()
         path.write_bytes(gzip.compress(content) if kind == "gz" else content)
     return name
+
+
+def claimed(
+    folder: Path, made: Any, name: str = "loads.csv", *, scene: cr.Scene, **how: Any
+) -> Claimed:
+    """The loads of a file that holds this."""
+    return read_forces(folder / put(folder, made, name), scene, Manner(**how))
 
 
 SMALL: dict[str, Any] = {

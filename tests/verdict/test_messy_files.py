@@ -10,14 +10,13 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from scene_files import Columns, cells, lines, put, scene_text
+from scene_files import Columns, cells, claimed, lines, put, scene_text
 from scenes import MATERIAL, hexagonal
 from scipy.io import savemat
 
 import convexrough as cr
 from convexrough.errors import MistakesError
 from convexrough.run.study import UnitsTable
-from convexrough.verdict.claims import Manner, read_forces
 
 COUNT = 12
 RNG = np.random.default_rng(5)
@@ -270,9 +269,9 @@ def test_pressures_at_hexagonal_points(tmp_path: Path) -> None:
     scene = hexagonal(spacing=1e-3, within=4e-3)
     x, y = scene.asperities.positions.T
     columns = {"x": x, "y": y, "pressure": np.full(len(x), 2.0)}
-    claimed = read_forces(tmp_path / put(tmp_path, columns), scene, Manner())
-    np.testing.assert_allclose(claimed.values, 2.0 * 1e-6 * np.sqrt(0.75), rtol=1e-9)
-    assert "each of area 8.6603e-07" in claimed.note
+    found = claimed(tmp_path, columns, scene=scene)
+    np.testing.assert_allclose(found.values, 2.0 * 1e-6 * np.sqrt(0.75), rtol=1e-9)
+    assert "each of area 8.6603e-07" in found.note
 
 
 @pytest.mark.parametrize("height", [-2.5e-3, -2e-4])
@@ -289,8 +288,7 @@ def test_pixels_of_a_large_disc_nearer_to_a_small_neighbour(tmp_path: Path, heig
     x, y = (each.ravel() for each in np.mgrid[-0.09:0.14:4e-4, -0.09:0.14:4e-4])
     pressure = cr.fields.pressure(contact, np.column_stack((x, y)))
     pressure[np.hypot(x - 0.04, y) < contact.contact_radii[1]] = 0.0
-    name = put(tmp_path, {"x": x, "y": y, "pressure": pressure})
-    loads = read_forces(tmp_path / name, scene, Manner()).values
+    loads = claimed(tmp_path, {"x": x, "y": y, "pressure": pressure}, scene=scene).values
     verdict = cr.verify(scene, loads, load=3.0, within=0.02)
     assert verdict.wrongly_open.tolist() == ([1] if contact.loads[1] > 0 else [])
     assert len(verdict.wrongly_loaded) == 0
@@ -303,27 +301,23 @@ def test_nodes_with_loads_in_a_wrong_unit(tmp_path: Path) -> None:
     loads = cr.press(scene, approach=2e-6).loads
     x, y = (scene.asperities.positions[:, None] + [[0.0, 0.0], [5e-5, 0.0]]).reshape(-1, 2).T
     columns = {"x": x, "y": y, "load": np.repeat(loads, 2) / 2 * 1e3}
-    claimed = read_forces(tmp_path / put(tmp_path, columns), scene, Manner(nodes=True))
-    np.testing.assert_allclose(claimed.values, loads * 1e3, rtol=1e-6)
+    found = claimed(tmp_path, columns, scene=scene, nodes=True)
+    np.testing.assert_allclose(found.values, loads * 1e3, rtol=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("pattern", "moved", "cause"),
-    [
+def test_a_lattice_moved(tmp_path: Path) -> None:
+    """Most rows of the shifted one lie on an asperity, the wrong one."""
+    for pattern, moved, cause in (
         (cr.Asperities.square, lambda points: np.add(points, [1e-3, 0]),
          "all are shifted by [0.001, 0], to within 1e-05, expected x, y relative to the sphere's"),
         (cr.Asperities.hexagonal, lambda points: points[:, ::-1],
          "x and y are exchanged: --column x=y --column y=x"),
-    ],
-)  # fmt: skip
-def test_a_lattice_moved(tmp_path: Path, pattern: Any, moved: Any, cause: str) -> None:
-    """Most rows of the shifted one lie on an asperity, the wrong one."""
-    asperities = pattern(spacing=1e-3, tip_radius=0.02, within=4e-3)
-    scene = cr.Scene(1.0, asperities, MATERIAL)
-    x, y = moved(asperities.positions).T
-    name = put(tmp_path, {"x": x, "y": y, "load": np.ones(len(x))})
-    with pytest.raises(MistakesError, match=re.escape(f"{tmp_path / name}: positions: {cause}")):
-        read_forces(tmp_path / name, scene, Manner())
+    ):  # fmt: skip
+        asperities = pattern(spacing=1e-3, tip_radius=0.02, within=4e-3)
+        x, y = moved(asperities.positions).T
+        columns = {"x": x, "y": y, "load": np.ones(len(x))}
+        with pytest.raises(MistakesError, match=re.escape(f"loads.csv: positions: {cause}")):
+            claimed(tmp_path, columns, scene=cr.Scene(1.0, asperities, MATERIAL))
 
 
 def on_square() -> cr.Contact:
@@ -335,9 +329,9 @@ def on_square() -> cr.Contact:
 def test_positions_of_contact_points(tmp_path: Path) -> None:
     scene, loads = on_square().scene, on_square().loads
     x, y = scene.contact_points.T
-    name = put(tmp_path, {"x": x[::-1], "y": y[::-1], "load": loads[::-1]})
-    claimed = read_forces(tmp_path / name, scene, Manner(tolerance=1e-5))
-    np.testing.assert_array_equal(claimed.values, loads)
+    columns = {"x": x[::-1], "y": y[::-1], "load": loads[::-1]}
+    found = claimed(tmp_path, columns, scene=scene, tolerance=1e-5)
+    np.testing.assert_array_equal(found.values, loads)
 
 
 def test_headers_of_nodes_at_a_square_lattice(tmp_path: Path) -> None:
@@ -351,7 +345,7 @@ def test_headers_of_nodes_at_a_square_lattice(tmp_path: Path) -> None:
     for moved, said in ((1e-3 * nodes, scales), (np.add(nodes, [0.02, 0]), shifts)):
         columns = {"x": moved[:, 0], "y": moved[:, 1], "load": shares}
         with pytest.raises(MistakesError, match=re.escape(said)):
-            read_forces(tmp_path / put(tmp_path, columns), scene, Manner(nodes=True))
+            claimed(tmp_path, columns, scene=scene, nodes=True)
 
 
 # Units
@@ -402,9 +396,8 @@ def test_results_say_their_units(case: Case) -> None:
         cr.read_scene("a.toml")
 
 
-@pytest.mark.parametrize(
-    ("columns", "units", "said"),
-    [
+def test_wrong_columns_of_summits(case: Case) -> None:
+    for columns, units, said in (
         (XY | NM, METRES, "column height: found nm, expected m, the scene's unit; 1 nm is 1e-09 m"),
         ({"x [m]": XY["x"], "y [N]": XY["y"]}, METRES, "found N, a unit of force"),
         (UM | {"height": HEIGHTS}, CONVERT, "column height: found no unit, expected one, as x"),
@@ -414,14 +407,11 @@ def test_results_say_their_units(case: Case) -> None:
         (MEANS, METRES, "row 14: found the means of the other rows, expected an"),
         (SUMS, METRES, "row 14: found the sums of the other rows, expected an"),
         (XY | {"mean_pressure": HEIGHTS, "rise": HEIGHTS}, METRES, "columns: found rise, but no"),
-    ],
-)
-def test_wrong_columns_of_summits(case: Case, columns: Columns, units: str, said: str) -> None:
-    write_scene(units=units)
-    with pytest.raises(cr.InputError) as refused:
-        case.read(columns)
-    assert said in str(refused.value)
-    assert ("convert = true" in str(refused.value)) == ("the scene's unit;" in said)
+    ):
+        write_scene(units=units)
+        with pytest.raises(cr.InputError, match=re.escape(said)) as refused:
+            case.read(columns)
+        assert ("convert = true" in str(refused.value)) == ("the scene's unit;" in said)
 
 
 @pytest.mark.parametrize("named", ["", 'height = "z"', 'height = "Z"', 'z = "height"'])
@@ -438,9 +428,8 @@ def test_a_pressure_implies_the_unit_of_force(units: str) -> None:
     assert UnitsTable(length=length, pressure=pressure).names.force == force
 
 
-@pytest.mark.parametrize(
-    ("modulus", "units", "said"),
-    [
+def test_units_of_scenes(case: Case) -> None:
+    for modulus, units, said in (
         ("youngs_modulus = 210", METRES, "found 210 N/m², which is 210 Pa, expected"),
         (f"{STEEL}\nhardness = 2e15", METRES, "[material] hardness: found 2e+15 N/m², which is 2e"),
         (BODIES, METRES, "[material.base] youngs_modulus: found 70 N/m², which is 70 Pa, expected"),
@@ -449,11 +438,9 @@ def test_a_pressure_implies_the_unit_of_force(units: str) -> None:
         (STEEL, 'length = "MM"\nforce = "N"', 'expected a unit of length; did you mean "mm"?'),
         (STEEL, 'length = "N"', "length: found N, a unit of force, expected a unit of length"),
         ("E = 210e9", METRES, 'E: unknown key, did you mean "youngs_modulus"?'),
-    ],
-)  # fmt: skip
-def test_units_of_scenes(case: Case, modulus: str, units: str, said: str) -> None:
-    write_scene(modulus, units)
-    assert case.command("run", "scene.toml", "--no-figures").refuses(said)
+    ):  # fmt: skip
+        write_scene(modulus, units)
+        assert case.command("run", "scene.toml", "--no-figures").refuses(said)
 
 
 def test_the_modulus_is_said(case: Case) -> None:

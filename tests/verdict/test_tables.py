@@ -2,41 +2,31 @@
 
 import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from scene_files import put, refusal, scene_text
+from scene_files import claimed, put, refusal, scene_text
 from scenes import rough
 
 import convexrough as cr
 from convexrough.run.asperity_file import read_summits
-from convexrough.run.scene_file import read_scene
 from convexrough.tabular.roles import Reading
 from convexrough.tabular.units import UnitNames
-from convexrough.verdict.claims import Claimed, Manner, read_forces
+from convexrough.verdict.claims import Manner, read_forces
 
 PLACES = [[0.0, 0.0], [1.0, 0.0], [0.5, 2.5]]
 LOADS = [1.5, 0.0, 2.5e-5]
 
 
 SMALL = cr.Scene(1.0, cr.Asperities(PLACES, 0.1), cr.Material(1.0, 0.3), geometry="summit")
-
-
-def read_loads(path: Path, scene: cr.Scene = SMALL, **how: Any) -> Claimed:
-    return read_forces(path, scene, Manner(**how))
-
-
-def read(
-    folder: Path, made: Any, name: str = "loads.csv", scene: cr.Scene = SMALL, **how: Any
-) -> Claimed:
-    """The loads of a file that holds this."""
-    return read_loads(folder / put(folder, made, name), scene, **how)
+read = partial(claimed, scene=SMALL)
 
 
 def refused(folder: Path, content: str | bytes) -> list[str]:
-    return refusal(read_loads, folder / put(folder, content))
+    return refusal(lambda _: read(folder, content), folder / "loads.csv")
 
 
 ROWS = "0,0,1.5\n1,0,0\n0.5,2.5,2.5e-5\n"
@@ -101,7 +91,7 @@ def test_a_line_of_numbers(tmp_path: Path) -> None:
     row = cr.Asperities([[i, 0] for i in range(5)], 0.1)
     scene = cr.Scene(1.0, row, cr.Material(1.0, 0.3), geometry="summit")
     for name, made in (("a.csv", "1,2,3,4,5.5\n"), ("a.npy", [[1, 2, 3, 4, 5.5]])):
-        assert read(tmp_path, made, name, scene).values.tolist() == [1, 2, 3, 4, 5.5]
+        assert read(tmp_path, made, name, scene=scene).values.tolist() == [1, 2, 3, 4, 5.5]
     assert read(tmp_path, "1.5,0,2.5e-5\n").values.tolist() == LOADS
     few = replace(SMALL, asperities=cr.Asperities(PLACES[:2], 0.1))
     assert read(tmp_path, "0.25,0.5\n", scene=few).values.tolist() == [0.25, 0.5]
@@ -155,21 +145,16 @@ def test_text_in_arrays_that_is_none(tmp_path: Path) -> None:
 
 
 def test_parquet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import pyarrow
-    from pyarrow import parquet
-
     x, y = np.transpose(PLACES)
     columns = {"x": x[::-1], "y": y[::-1], "status": ["a", "b", "c"], "load": LOADS[::-1]}
-    parquet.write_table(pyarrow.table(columns), tmp_path / "a.parquet")
-    assert read_loads(tmp_path / "a.parquet").values.tolist() == LOADS
-    parquet.write_table(pyarrow.table({"load": [1.0, None, 2.0]}), tmp_path / "gap.parquet")
+    assert read(tmp_path, columns, "a.parquet").values.tolist() == LOADS
     with pytest.raises(cr.InputError, match="entry 1, column load: found None, expected a finite"):
-        read_loads(tmp_path / "gap.parquet")
+        read(tmp_path, {"load": [1.0, None, 2.0]}, "gap.parquet")
     with pytest.raises(cr.FileError, match=r"not an \.parquet file"):
         read(tmp_path, b"PAR1 and then nothing", "b.parquet")
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     with pytest.raises(cr.FileError, match="needs pyarrow: pip install pyarrow"):
-        read_loads(tmp_path / "a.parquet")
+        read_forces(tmp_path / "a.parquet", SMALL, Manner())
 
 
 def test_shear_forces_with_statuses(tmp_path: Path) -> None:
@@ -185,12 +170,13 @@ def test_loads_at_a_slightly_different_place(tmp_path: Path) -> None:
     loads = cr.press(scene, approach=2e-5).loads
     x, y = scene.asperities.positions.T
     for shift, tolerances in ((0.009 * 0.0025, (None, 1e-5)), (0.011 * 0.0025, (1e-4, None))):
-        path = tmp_path / put(tmp_path, {"x": x + shift, "y": y, "load": loads})
+        columns = {"x": x + shift, "y": y, "load": loads}
         accepted, refused = tolerances
-        assert np.array_equal(read_loads(path, scene, tolerance=accepted).values, loads)
+        found = read(tmp_path, columns, scene=scene, tolerance=accepted)
+        assert np.array_equal(found.values, loads)
         said = rf"by \[{shift:.6g}, 0\], to within {refused or 2.5e-5:.6g}, exp"
         with pytest.raises(cr.InputError, match=said):
-            read_loads(path, scene, tolerance=refused)
+            read(tmp_path, columns, scene=scene, tolerance=refused)
 
 
 @pytest.mark.sample(8)
@@ -242,7 +228,7 @@ def test_summits(tmp_path: Path) -> None:
     (tmp_path / "data/summits.csv").write_bytes(b"\xef\xbb\xbf" + content.encode())
     # The path is relative to the scene file, wherever the command runs.
     (tmp_path / "scene.toml").write_text(scene_text('pattern = "file"\npath = "data/summits.csv"'))
-    asperities = read_scene(tmp_path / "scene.toml").scene.asperities
+    asperities = cr.read_scene(tmp_path / "scene.toml").scene.asperities
     assert asperities.positions.tolist() == [[0.25, 0.5], [2.0, -1.0]]
     assert asperities.tip_radii.tolist() == [0.1, 0.2]
     assert asperities.heights.tolist() == [1e-3, -1e-3]
