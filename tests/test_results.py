@@ -37,28 +37,18 @@ def results() -> dict[str, Any]:
     Q = 0.25 * contact.load
     wrong = contact.loads.copy()
     wrong[3] = 0.0
+    higher = cr.Direction(heights=1e-8)
     state, cycle = cr.shear(contact, force=Q), cr.cycle(contact, maximum=Q)
     few = (solvers.Conic(), solvers.BristleQP())
     contacts = cr.press_many([scene, scene], approach=PAPER_APPROACH)
     surface = cr.surface.self_affine(0.8, 0.1, 32.0, seed=1, pixels=128).detrend("sphere")
     summits = surface.summits()
     found = (
-        surface,
-        summits,
-        summits.origin,
-        surface.moments,
+        surface, surface.moments, summits, summits.origin,
         cr.surface.provability(summits, lambda left: on(left, surface), levels=[0.05, 0.2]),
-        scene,
-        scene.asperities,
-        contact,
-        contact.certificate,
-        contacts,
-        contacts.cycles(Q),
-        state,
-        state.certificate,
-        cr.shear_vector(contact, force=Q),
-        cycle,
-        cycle.loop(16, asperities=[0, 3]),
+        scene, scene.asperities, contact, contact.certificate, contacts, contacts.cycles(Q),
+        state, state.certificate, cr.shear_vector(contact, force=Q),
+        cycle, cycle.loop(16, asperities=[0, 3]), cycle.gradient(), cr.fretting(cycle),
         cr.verify(scene, wrong, approach=PAPER_APPROACH),
         compare(scene, approach=PAPER_APPROACH, solvers=few),
         cr.smooth(scene, load=contact.load),
@@ -70,12 +60,8 @@ def results() -> dict[str, Any]:
         cr.phase_losses(scene, load=contact.load, load_amplitude=Q, force_amplitude=Q / 2,
                         phases=[0.0, 1.0], factors=[0.5, 1.0], chords=6),
         cr.MemoryCurve.pressed(1.0).go(1.0, 0.25)[0],
-        cycle.gradient(),
-        cr.fretting(cycle),
         cr.program(scene, approach=PAPER_APPROACH),
-        contact.change(cr.Direction(heights=1e-8)),
-        state.change(cr.Direction(heights=1e-8)),
-        cr.Direction(heights=1e-8),
+        higher, contact.change(higher), state.change(higher),
         cr.Objective(scene=scene, of="loss", load=contact.load, force=Q),
     )  # fmt: skip
     return {type(each).__name__: each for each in found}
