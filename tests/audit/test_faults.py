@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +20,13 @@ TESTS, BATCH = Path(__file__).parent.parent, 18
 forks = pytest.mark.skipif(not hasattr(os, "fork"), reason="trials are forked processes")
 
 
-def python(*arguments: str, **options: Any) -> tuple[int, str, str]:
+def ended(*command: str, **options: Any) -> tuple[int, str, str]:
     """Status and output of a process of its own, without the threads of this one."""
-    done = subprocess.run(
-        [sys.executable, *arguments], capture_output=True, text=True, check=False, **options
-    )
+    done = subprocess.run(command, capture_output=True, text=True, check=False, **options)
     return done.returncode, done.stdout, done.stderr
+
+
+python = partial(ended, sys.executable)
 
 
 def printed(program: str, *numbers: int) -> list[str]:
@@ -62,8 +64,8 @@ def test_what_a_killed_process_left_is_removed_by_the_next(tmp_path: Path, comma
     (tmp_path / "a.toml").write_text(scene_text())
     folder = tmp_path / "out"
     folder.mkdir()
-    ended = python("-c", "import os; print(os.getpid())")[1].strip()
-    left = folder / f".summary.json.{ended}.unfinished"
+    process = python("-c", "import os; print(os.getpid())")[1].strip()
+    left = folder / f".summary.json.{process}.unfinished"
     for line in ("run a.toml --out out --no-figures", "new out/b.toml"):
         left.write_text("{")
         assert command(*line.split()).status == 0
@@ -143,10 +145,7 @@ def test_an_interrupt_at_any_moment(tmp_path: Path, delay: float) -> None:
 def test_an_output_that_nobody_takes(tmp_path: Path, where: str, status: int, said: str) -> None:
     (tmp_path / "a.toml").write_text(scene_text())
     run = f"sleep 0.2; '{sys.executable}' -m convexrough run a.toml --no-figures"
-    code = f"({run}; echo $? >status) {where}"
-    done = subprocess.run(
-        ["sh", "-c", code], cwd=tmp_path, stderr=subprocess.PIPE, text=True, check=False
-    )
+    *_, heard = ended("sh", "-c", f"({run}; echo $? >status) {where}", cwd=tmp_path)
     assert int((tmp_path / "status").read_text()) == status
-    assert done.stderr == (f"convexrough: error: {said}\n" if said else "")
+    assert heard == (f"convexrough: error: {said}\n" if said else "")
     assert (tmp_path / "a-results" / "summary.json").exists()

@@ -366,9 +366,8 @@ def test_all_mistakes_are_told_at_once(tmp_path: Path) -> None:
     ]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("wrong", "meant", "why"),
-    [
+def test_a_slip(tmp_path: Path) -> None:
+    for wrong, meant, why in (
         ("spacing = 2.5D-3", "spacing = 2.5e-3", "exponent"),
         ("spacing = .0025", "spacing = 0.0025", "both sides"),
         ("spacing: 0.0025", "spacing = 0.0025", "equals sign"),
@@ -378,14 +377,12 @@ def test_all_mistakes_are_told_at_once(tmp_path: Path) -> None:
         ("spacing = Inf", "spacing = inf", "lower case"),
         (r'path = "C:\Users\a.csv"', r"path = 'C:\Users\a.csv'", "single quotes"),
         ("path = my summits.csv", 'path = "my summits.csv"', "straight quotes"),
-    ],
-)
-def test_a_slip(tmp_path: Path, wrong: str, meant: str, why: str) -> None:
-    text = scene_text('pattern = "hexagonal"\n' + wrong if "spacing" in wrong else wrong)
-    (line,) = refused(tmp_path, text)
-    number = text.split("\n").index(wrong) + 1
-    assert line.startswith(f"line {number}: found {wrong}, expected {meant}: ")
-    assert why in line
+    ):
+        text = scene_text('pattern = "hexagonal"\n' + wrong if "spacing" in wrong else wrong)
+        (line,) = refused(tmp_path, text)
+        number = text.split("\n").index(wrong) + 1
+        assert line.startswith(f"line {number}: found {wrong}, expected {meant}: ")
+        assert why in line
 
 
 @pytest.mark.parametrize("number", ["1\nspacing = 2e-3", "5*10^-5", "1/400", "5e+-5", "5e\u22125"])
