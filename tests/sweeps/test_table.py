@@ -490,12 +490,11 @@ WRONG = [
 ]  # fmt: skip
 
 
-@pytest.mark.sample(10)
-@pytest.mark.parametrize(("contents", "said"), WRONG)
-def test_mistakes(contents: dict[str, Any], said: str) -> None:
-    message = mistakes(contents)
-    assert said in message
-    assert all(line.startswith("sweep.toml: ") for line in message.splitlines())
+def test_mistakes() -> None:
+    for contents, said in WRONG:
+        message = mistakes(contents)
+        assert said in message
+        assert all(line.startswith("sweep.toml: ") for line in message.splitlines())
 
 
 def test_all_mistakes_are_told_at_once() -> None:
