@@ -165,35 +165,30 @@ def test_loads_that_are_far_off_do_not_hold_by_default(wrong: str) -> None:
     assert verdict.error == pytest.approx(999, rel=1e-6)
 
 
-@pytest.mark.sample(1)
-@pytest.mark.parametrize(
-    ("moved", "said"),
-    [
-        (lambda points: points[:, ::-1], "x and y exchanged"),
-        (lambda points: points * [-1, 1], "the other sign of x"),
-        (lambda points: points * [1, -1], "the other sign of y"),
-        (lambda points: -points, "the other sign of x and y"),
-        (lambda points: points[:, ::-1] * [1, -1], "the array turned by -90 degrees"),
-    ],
-)
-def test_exchanged_coordinates_of_a_square_array(moved: Any, said: str) -> None:
+def test_exchanged_coordinates_of_a_square_array() -> None:
     """Positions match all the same; only the loads tell."""
     asperities = cr.Asperities.square(
         spacing=0.0025, tip_radius=0.02, within=0.0102, height_std=2e-6, seed=3
     )
     scene = cr.Scene(1.0, asperities, MATERIAL, friction=0.5, geometry="summit")
     contact = cr.press(scene, approach=PAPER_APPROACH)
-    points = asperities.positions
-    partners = [int(np.hypot(*(points - place).T).argmin()) for place in moved(points)]
-    verdict = cr.verify(scene, contact.loads[partners], approach=PAPER_APPROACH)
-    assert not verdict.holds
-    assert f"the loads are right with {said}" in list(verdict.hints())
-    noise = np.random.default_rng(0).uniform(0.995, 1.005, len(partners))  # as sums of pixels have
-    verdict = cr.verify(scene, contact.loads[partners] * noise, approach=PAPER_APPROACH)
-    assert f"the loads are right with {said}" in list(verdict.hints())
     state = cr.shear(contact, force=0.1 * contact.load)
-    sheared = verify_shear(contact, state.forces[partners], force=0.1 * contact.load)
-    assert f"the shear forces are right with {said}" in list(sheared.hints())
+    points = asperities.positions
+    noise = np.random.default_rng(0).uniform(0.995, 1.005, len(points))  # as sums of pixels have
+    for moved, said in (
+        (points[:, ::-1], "x and y exchanged"),
+        (points * [-1, 1], "the other sign of x"),
+        (points * [1, -1], "the other sign of y"),
+        (-points, "the other sign of x and y"),
+        (points[:, ::-1] * [1, -1], "the array turned by -90 degrees"),
+    ):
+        partners = [int(np.hypot(*(points - place).T).argmin()) for place in moved]
+        for loads in (contact.loads[partners], contact.loads[partners] * noise):
+            verdict = cr.verify(scene, loads, approach=PAPER_APPROACH)
+            assert not verdict.holds
+            assert f"the loads are right with {said}" in list(verdict.hints())
+        sheared = verify_shear(contact, state.forces[partners], force=0.1 * contact.load)
+        assert f"the shear forces are right with {said}" in list(sheared.hints())
     wrong = verify_shear(contact, state.forces, force=0.1 * contact.load, sliding=False)
     assert not wrong.holds
     assert list(wrong.hints()) == []  # the forces are right, the statuses are not

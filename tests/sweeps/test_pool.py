@@ -53,16 +53,10 @@ class Shuffled(Executor):
         return self._given[-1][0]
 
 
-@pytest.mark.sample(2)
-@pytest.mark.parametrize(
-    "executor",
-    [lambda: ThreadPoolExecutor(3), lambda: ProcessPoolExecutor(1, mp_context=SPAWN), Shuffled],
-    ids=["threads", "processes of the user", "the last first"],
-)
-def test_executors(executor: Any, whole: cr.SweepTable) -> None:
-    given = executor()
-    assert same(cr.sweep(CONTENTS, executor=given), whole)
-    given.shutdown()
+def test_executors(whole: cr.SweepTable) -> None:
+    for executor in (ThreadPoolExecutor(3), ProcessPoolExecutor(1, mp_context=SPAWN), Shuffled()):
+        with executor:
+            assert same(cr.sweep(CONTENTS, executor=executor), whole), executor
 
 
 @pytest.mark.sample(2)
