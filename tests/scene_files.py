@@ -3,6 +3,9 @@
 import csv
 import gzip
 import json
+import os
+import subprocess
+import sys
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -186,11 +189,8 @@ def sweeping(**keys: Any) -> dict[str, Any]:
 
 
 def toml(contents: dict[str, Any]) -> str:
-    """Of tables, of values and of inline tables."""
-    lines = []
-    for name, table in contents.items():
-        lines += [f"[{name}]", *(f"{key} = {_toml(value)}" for key, value in table.items())]
-    return "\n".join(lines) + "\n"
+    """A file of inline tables."""
+    return "".join(f"{name} = {_toml(table)}\n" for name, table in contents.items())
 
 
 def _toml(value: Any) -> str:
@@ -198,6 +198,26 @@ def _toml(value: Any) -> str:
         pairs = (f"{json.dumps(key)} = {_toml(it)}" for key, it in value.items())
         return "{" + ", ".join(pairs) + "}"
     return json.dumps(value)
+
+
+#: The command. An interrupt is an interrupt, whatever started the tests; the output says from when.
+INTERRUPTIBLE = """
+import signal, sys
+from convexrough.__main__ import main
+signal.signal(signal.SIGINT, signal.default_int_handler)
+print("started", flush=True)
+sys.exit(main())
+"""
+
+
+def scripted(folder: Path, script: str, *arguments: str) -> subprocess.Popen[str]:
+    """A script, which needs no guard although its workers are new interpreters."""
+    (folder / "script.py").write_text(script)
+    return subprocess.Popen(
+        [sys.executable, "script.py", *arguments], cwd=folder, stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE, text=True, start_new_session=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )  # fmt: skip
 
 
 def swept(contents: Any, **options: Any) -> cr.SweepTable:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from scene_files import HEXAGONAL, scene_text
+from scene_files import HEXAGONAL, INTERRUPTIBLE, scene_text, scripted
 
 from convexrough.atomic import remove_unfinished
 
@@ -86,13 +86,6 @@ def test_new_on_a_full_disk_leaves_nothing(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-# A job in the background inherits a signal that is ignored; this one must not.
-START = (
-    "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); "
-    "from convexrough.__main__ import main; print('started', flush=True); sys.exit(main())"
-)
-
-
 def test_a_line_is_completed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("_CONVEXROUGH_COMPLETE", "bash_complete")
     monkeypatch.setenv("COMP_WORDS", "convexrough run --pr")
@@ -120,10 +113,7 @@ def test_an_interrupt_while_an_object_is_freed(tmp_path: Path) -> None:
 def test_an_interrupt_at_any_moment(tmp_path: Path, delay: float) -> None:
     rough = HEXAGONAL.replace("0.0025", "1e-4").replace("0.02", "8e-4")
     (tmp_path / "a.toml").write_text(scene_text(rough + "height_std = 1e-7\nseed = 1"))
-    running = subprocess.Popen(
-        [sys.executable, "-c", START, "run", "a.toml"],
-        cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
+    running = scripted(tmp_path, INTERRUPTIBLE, "run", "a.toml")
     assert running.stdout is not None
     running.stdout.readline()
     time.sleep(delay)

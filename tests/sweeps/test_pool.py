@@ -6,8 +6,6 @@ import os
 import random
 import shutil
 import signal
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
@@ -18,7 +16,7 @@ from typing import Any
 
 import psutil
 import pytest
-from scene_files import SMALL, same, sweeping, swept, tables, toml
+from scene_files import INTERRUPTIBLE, SMALL, same, scripted, sweeping, swept, tables, toml
 
 import convexrough as cr
 from convexrough.progress import logged
@@ -185,16 +183,6 @@ def resumed(folder: Path) -> cr.SweepTable:
     return swept(folder / "a.toml", out=folder / "a-sweep", resume=True)
 
 
-def scripted(folder: Path, script: str, *arguments: str) -> subprocess.Popen[str]:
-    """A script, which needs no guard although its workers are new interpreters."""
-    (folder / "script.py").write_text(script)
-    return subprocess.Popen(
-        [sys.executable, "script.py", *arguments], cwd=folder, stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE, text=True, start_new_session=True,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
-    )  # fmt: skip
-
-
 #: The command, which is killed when it has written its n-th file and is about to name it.
 KILLED = """
 import os, signal, sys
@@ -261,21 +249,12 @@ def test_workers_are_killed_at_any_moment(request: Any, file: Path, whole: Any) 
     assert same(cr.open_sweep(file / "a-sweep"), whole)
 
 
-#: An interrupt is an interrupt, whatever started the tests.
-INTERRUPTIBLE = """
-import signal, sys
-from convexrough.cli import main
-signal.signal(signal.SIGINT, signal.default_int_handler)
-sys.exit(main(["sweep", "a.toml", "--workers", "1"]))
-"""
-
-
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("event", ["a-sweep/manifest.json", "a-sweep/parts/*.parquet"])
 def test_an_interrupt_keeps_what_was_computed(tmp_path: Path, event: str) -> None:
     """As soon as there is a folder, and as soon as there is a part; the terminal tells workers."""
     (tmp_path / "a.toml").write_text(toml(tables(sweep={"seeds": 1000, "measure": ["load"]})))
-    process = scripted(tmp_path, INTERRUPTIBLE)
+    process = scripted(tmp_path, INTERRUPTIBLE, "sweep", "a.toml", "--workers", "1")
     while not list(tmp_path.glob(event)):
         assert process.poll() is None
         time.sleep(0.01)
