@@ -16,6 +16,7 @@ import signal
 import sys
 import tempfile
 import time
+import traceback
 from collections import Counter
 from pathlib import Path
 
@@ -131,8 +132,6 @@ def _forked(folder: Path, arguments: list[str], limit: int | None) -> int:
     except KeyboardInterrupt:  # as the command begins or ends: `__main__` takes these
         status = 130
     except BaseException:
-        import traceback
-
         if status == 99:
             os.write(2, traceback.format_exc().encode())
     finally:

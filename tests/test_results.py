@@ -137,8 +137,7 @@ def test_errors_pass_between_processes() -> None:
 
 def columns(result: Any) -> dict[str, np.ndarray[Any, Any]]:
     """Every array that a result says it has, by the name of one value."""
-    arrays = result._along.values() if hasattr(result, "_along") else ()
-    names = [name for each in arrays for name in each]
+    names = [name for each in getattr(result, "_along", {}).values() for name in each]
     found = {}
     for name in names:
         one, values = singular(name), getattr(result, name)

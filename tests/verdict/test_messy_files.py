@@ -36,6 +36,7 @@ class Case(NamedTuple):
     """A scene, its solution, a shuffled order, and a folder with its files."""
 
     contact: cr.Contact
+    loads: Any
     order: Any
     folder: Path
     command: Any
@@ -47,10 +48,6 @@ class Case(NamedTuple):
         """The scene, with another table of summits."""
         put(self.folder, columns, "summits.csv")
         return cr.read_scene(self.folder / "scene.toml")
-
-    @property
-    def loads(self) -> Any:
-        return self.contact.loads
 
     def table(self, names: str = "x y load", **more: Any) -> dict[str, Any]:
         x, y, load = names.split(" ")
@@ -76,7 +73,8 @@ def case(tmp_path: Path, command: Any) -> Case:
     put(tmp_path, SUMMITS, "summits.csv")
     contact = cr.read_scene("scene.toml").press()
     assert 3 < (contact.loads > 0).sum() < COUNT - 3
-    return Case(contact, np.random.default_rng(1).permutation(COUNT), tmp_path, command)
+    order = np.random.default_rng(1).permutation(COUNT)
+    return Case(contact, contact.loads, order, tmp_path, command)
 
 
 def write_scene(modulus: str = STEEL, units: str = METRES) -> None:
@@ -485,16 +483,13 @@ def test_loads_beside_pressures(case: Case) -> None:
 
 
 def test_findings_as_junit(case: Case) -> None:
-    def suite(name: str) -> Any:
-        (found,) = ElementTree.parse(case.folder / name).getroot().iter("testsuite")
-        return found
-
     wrong = case.loads.copy()
     wrong[np.argmax(wrong)] = 0.0
     assert case.verify({"load": wrong}, "--junit", "a.xml").status == 3
-    cases = {each.get("name"): each for each in suite("a.xml")}
+    (suite,) = ElementTree.parse("a.xml").getroot().iter("testsuite")
+    cases = {each.get("name"): each for each in suite}
     assert list(cases) == ["loads: contact set", "loads: undecided", "loads: off", "loads: total"]
-    assert suite("a.xml").get("failures") == str(sum(len(each) for each in cases.values()))
+    assert suite.get("failures") == str(sum(len(each) for each in cases.values()))
     assert f"{np.argmax(case.loads)} at (" in str(cases["loads: contact set"][0].text)
     assert str(cases["loads: off"][0].get("message")).startswith("loads: off: at most ")
     again = case.verify({"load": case.loads[1:]}, "--junit", "a.xml")
