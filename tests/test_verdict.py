@@ -103,8 +103,7 @@ def test_a_verdict_is_about_one_solution() -> None:
     tips = [0.0250543610961, 0.0176714912943, 0.0237542897971, 0.0130631034335, 0.0227821938681]
     heights = [8.54561406887e-06, 5.85066476367e-06, -7.42799161516e-06, 7.58512260295e-06,
                -1.09425554780e-05]  # fmt: skip
-    positions = np.column_stack((x, y))
-    scene = cr.Scene(np.inf, cr.Asperities(positions, tips, heights), MATERIAL)
+    scene = cr.Scene(np.inf, cr.Asperities(np.column_stack((x, y)), tips, heights), MATERIAL)
     loads = [1.3560739e-09, 3.4691122e-08, 0.0, 4.5960501e-08, 7.4320817e-09]
     approach = 2.6275812228551447e-05
     other = cr.press(scene, approach=approach, start=loads)
@@ -217,9 +216,6 @@ def test_exact_numbers_of_python_are_accepted(kind: Any) -> None:
     assert cr.program(scene, load=load).constant == cr.program(scene, load=1e-7).constant
 
 
-PAGE = Path(__file__).parent.parent / "docs" / "how-to" / "test-your-solver.md"
-
-
 def failure(call: Any, *arguments: Any, **options: Any) -> str:
     """The message of the assertion that fails."""
     with pytest.raises(AssertionError) as caught:
@@ -229,10 +225,11 @@ def failure(call: Any, *arguments: Any, **options: Any) -> str:
 
 def test_the_page_shows_what_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
     """The message of a failed check; test_documents.py runs the other blocks."""
-    first, second = re.findall(r"^```python\n(.*?)^```", PAGE.read_text(), re.M | re.S)[:2]
+    page = Path(__file__).parents[1].joinpath("docs/how-to/test-your-solver.md").read_text()
+    first, second = re.findall(r"^```python\n(.*?)^```", page, re.M | re.S)[:2]
     exec(first + second, {})
     printed = capsys.readouterr().out.strip()
-    assert printed in PAGE.read_text()
+    assert printed in page
     assert "claimed open, proved to touch: 1" in printed
 
 

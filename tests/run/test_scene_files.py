@@ -27,8 +27,6 @@ import convexrough as cr
 from convexrough.friction import general_step
 from convexrough.progress import logged
 
-#: Stages that rest on an order that is proved.
-RESTING = ("cycle", "history", "path", "steady", "shakedown")
 SHADED = 'pattern = "file"\npath = "shaded.csv"\ngeometry = "summit"', "approach = 1.4"
 
 
@@ -72,7 +70,8 @@ def test_what_is_only_checked_is_not_certified(read: Any) -> None:
         results = {result.name: result for result in file.compute(contact)}
     assert [f"[{name}]" for name in file.stages] == [it for it in said if it.startswith("[")]
     assert all(result.certified for result in results.values())
-    for result in map(results.__getitem__, RESTING):
+    for name in ("cycle", "history", "path", "steady", "shakedown"):
+        result = results[name]
         for k, found in enumerate(result.found):
             wrong = {"order": "checked"} if result.name != "shakedown" else {"upper": np.inf}
             several = [*result.found]
@@ -125,13 +124,10 @@ def test_a_path_that_starts_and_ends_at_the_load_0(run: Any) -> None:
     assert (outcome.status, outcome.err) == (0, "")
 
 
-STEADY = FRICTION + "[steady]\nreference = 1e60\n"
-STEADY += "ellipse = {load = 1.0, force_amplitude = 0.1, chords = 6}\n"
-
-
 def test_a_steady_state_of_which_nothing_is_proved(run: Any) -> None:
     """Nothing times an infinite error is nothing: a warning of numpy's, and no number, was it."""
-    outcome = run(scene_text(f"{HEXAGONAL}within = 0.006", more=STEADY))
+    keys = "reference = 1e60\nellipse = {load = 1.0, force_amplitude = 0.1, chords = 6}\n"
+    outcome = run(scene_text(f"{HEXAGONAL}within = 0.006", more=f"{FRICTION}[steady]\n{keys}"))
     assert outcome.status == 3
     assert "nan" not in outcome.out
 

@@ -179,10 +179,6 @@ def rows(folder: Path) -> int:
     return len(cr.open_sweep(folder / "a-sweep").read()["scene"])
 
 
-def resumed(folder: Path) -> cr.SweepTable:
-    return swept(folder / "a.toml", out=folder / "a-sweep", resume=True)
-
-
 #: The command, which is killed when it has written its n-th file and is about to name it.
 KILLED = """
 import os, signal, sys
@@ -219,7 +215,7 @@ def test_the_command_is_killed_at_any_moment(request: Any, file: Path, whole: An
         if (file / "a-sweep/manifest.json").exists():
             assert rows(file) >= known
             known = rows(file)
-    assert same(resumed(file), whole)
+    assert same(swept(file / "a.toml", out=file / "a-sweep", resume=True), whole)
     assert {path.suffix for path in (file / "a-sweep/parts").iterdir()} == {".parquet"}
 
 
@@ -294,7 +290,7 @@ def test_a_full_disk(file: Path, whole: cr.SweepTable) -> None:
     assert out.endswith(f"cannot be written: File too large; {kept}\n"), out
     assert rows(file) == SCENES // PARTS
     assert not list((file / "a-sweep/parts").glob(".*"))
-    assert same(resumed(file), whole)
+    assert same(swept(file / "a.toml", out=file / "a-sweep", resume=True), whole)
 
 
 def test_rows_of_another_sweep_are_not_mixed_in(tmp_path: Path, monkeypatch: Any) -> None:

@@ -273,10 +273,8 @@ def test_pressures_at_hexagonal_points(tmp_path: Path) -> None:
 def test_pixels_of_a_large_disc_nearer_to_a_small_neighbour(tmp_path: Path, height: float) -> None:
     """The neighbour is open, or its contact is missing in the map."""
     places = [(0.0, 0.0), (0.04, 0.0), (0.1, 0.1), (-0.05, 0.1), (0.1, -0.05), (-0.05, -0.05)]
-    heights = np.array([0.0, height, 0.0, 0.0, 0.0, 0.0])
-    tips = np.array([2.0, 0.5, 0.5, 0.5, 0.5, 0.5])
-    material = cr.Material.from_youngs(210e3, 0.3)
-    scene = cr.Scene(np.inf, cr.Asperities(np.array(places), tips, heights), material)
+    asperities = cr.Asperities(places, [2.0, *5 * [0.5]], [0.0, height, *4 * [0.0]])
+    scene = cr.Scene(np.inf, asperities, cr.Material.from_youngs(210e3, 0.3))
     contact = cr.press(scene, load=3.0)
     assert contact.contact_radii[0] > 0.02
     assert contact.crowding < 1

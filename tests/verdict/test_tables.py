@@ -230,16 +230,11 @@ def test_summits(tmp_path: Path) -> None:
     assert asperities.heights.tolist() == [1e-3, -1e-3]
 
 
-@pytest.mark.parametrize(
-    "name", ["tip radius", "Tip-Radius", "TIP  RADIUS (m)", "tip\nradius", "radius [Metres]"]
-)
-def test_the_spelling_of_a_heading(tmp_path: Path, name: str) -> None:
-    path = tmp_path / put(tmp_path, [[["x", "y", name], [0, 1, 2]]], "a.xlsx")
-    how = Reading(units=UnitNames("m"))
-    assert read_summits(path, tip_radius=None, how=how).tip_radii.tolist() == [2]
-
-
-KEYED = Reading(keyed=True)  # as for the file of a scene
+def test_the_spelling_of_a_heading(tmp_path: Path) -> None:
+    for name in ("tip radius", "Tip-Radius", "TIP  RADIUS (m)", "tip\nradius", "radius [Metres]"):
+        path = tmp_path / put(tmp_path, [[["x", "y", name], [0, 1, 2]]], "a.xlsx")
+        found = read_summits(path, tip_radius=None, how=Reading(units=UnitNames("m")))
+        assert found.tip_radii.tolist() == [2], name
 
 
 WRONG_SUMMITS = [
@@ -277,7 +272,7 @@ def test_comments_above_summits_could_state_a_unit(tmp_path: Path) -> None:
     """They are an error only if the scene names units and the header does not."""
     path, named = tmp_path / "summits.csv", Reading(units=UnitNames("m", "N"))
     path.write_text("# heights x 1000\nx,y,z\n0,0,1\n")
-    assert len(read_summits(path, tip_radius=1.0, how=KEYED)) == 1
+    assert len(read_summits(path, tip_radius=1.0, how=Reading(keyed=True))) == 1
     with pytest.raises(cr.ConvexroughError, match=r"heights x 1000', expected units .*, as x .m."):
         read_summits(path, tip_radius=1.0, how=named)
 
@@ -286,7 +281,7 @@ def test_wrong_summits(tmp_path: Path) -> None:
     for content, expected in WRONG_SUMMITS:
         path, tips = tmp_path / put(tmp_path, content), None if "neither" in expected else 1.0
         with pytest.raises(cr.ConvexroughError, match=re.escape(expected)) as caught:
-            read_summits(path, tip_radius=tips, how=KEYED)
+            read_summits(path, tip_radius=tips, how=Reading(keyed=True))
         assert str(caught.value).startswith(str(path))
 
 
