@@ -3,7 +3,6 @@
 And how outside programs read them: names of files, columns, and keys.
 """
 
-import csv
 import hashlib
 import json
 import re
@@ -141,7 +140,7 @@ def test_names_columns_and_keys(command: Any, tmp_path: Path, monkeypatch: Any) 
     assert (ran.status, ran.err) == (0, "")
     found: dict[str, Any] = {"files": sorted(path.name for path in Path("out").iterdir())}
     for path in Path("out").glob("*.csv"):
-        found[path.name] = next(csv.reader(path.read_text().splitlines()))
+        found[path.name] = path.read_text().partition("\n")[0].split(",")
     for name in ("summary.json", "files.json"):
         found[name] = keys(json.loads(Path("out", name).read_text()))
     loads = "out/asperities.csv"

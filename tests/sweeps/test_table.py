@@ -2,8 +2,6 @@
 
 import itertools
 import json
-import logging
-import math
 import pickle
 import shutil
 from dataclasses import replace
@@ -338,7 +336,7 @@ def test_resuming_computes_what_is_missing_or_damaged_only(
     (folder / "parts" / f".{gone.name}.123.unfinished").write_bytes(b"half")
     (folder / "parts/notes.txt").write_text("mine")
     times = {part: part.stat().st_mtime_ns for part in kept}
-    with caplog.at_level(logging.INFO, "convexrough"):
+    with caplog.at_level("INFO", "convexrough"):
         again = swept(SMALL, out=folder, resume=True)
     said = [news for news in caplog.messages if "scenes" in news]
     assert said[0] == "found 14 scenes of an earlier run"
@@ -458,7 +456,7 @@ def test_values_of_together_are_checked_together() -> None:
     places = "[sweep] together.path.loads[1], together.path.forces[1]"
     assert f"{places}: [path] loads, forces: found 3 and 2 values" in mistakes(paths([0.0] * 2))
     places = "sweep.toml: [sweep] together.path.forces[1]"
-    assert mistakes(paths([math.nan])).startswith(f"{places}: [path] forces[0]: found nan")
+    assert mistakes(paths([np.nan])).startswith(f"{places}: [path] forces[0]: found nan")
 
 
 WRONG = [

@@ -285,11 +285,10 @@ def test_wrong_summits(tmp_path: Path) -> None:
         assert str(caught.value).startswith(str(path))
 
 
-def test_a_run_names_what_it_does_not_use(command: Any, tmp_path: Path) -> None:
+def test_a_run_names_what_it_does_not_use(run: Any, tmp_path: Path) -> None:
     """And the sheet that it reads, the first one with cells."""
     table = [["x", "y", "z", "R", "load", "label"], [0, 0, 0, 1, 2, "a"]]
     put(tmp_path, [[], table, [["notes"]]], "a.xlsx")
     summits = 'pattern = "file"\npath = "a.xlsx"\ntip_radius = 0.1'
-    (tmp_path / "scene.toml").write_text(scene_text(summits))
     said = 'convexrough: note: a.xlsx: sheet "Sheet1" of 2, not used: R\n'
-    assert command("run", "scene.toml", "--no-figures").err.startswith(said)
+    assert run(scene_text(summits)).err.startswith(said)
