@@ -193,6 +193,8 @@ def test_exchanged_coordinates_of_a_square_array() -> None:
     assert list(wrong.hints()) == []  # the forces are right, the statuses are not
     unlike = cr.verify(scene, np.roll(contact.loads, 7), approach=PAPER_APPROACH)
     assert not any("the loads are right" in hint for hint in unlike.hints())
+    tiny = cr.verify(scene, 1e-312 * contact.loads, approach=PAPER_APPROACH)
+    assert list(tiny.hints()) == []  # the solution's loads, divided by the largest, overflow
 
 
 @pytest.mark.parametrize("factor", [0.9, 0.98, 1.02, 3.0, 1000.0])

@@ -28,8 +28,8 @@ SUSPICIOUS = 1e-3
 PREFIXES = {-9: "G", -6: "M", -3: "k", 3: "m", 6: "\N{MICRO SIGN}", 9: "n"}
 
 #: `_moved` treats points as equal if nearer than SAME_PLACE times the size of the array. `hints`
-#: does not explain an error of at most CORRECTED times the largest force.
-SAME_PLACE, CORRECTED = 1e-9, 1e-3
+#: does not explain an error of at most CORRECTED, or at least ABSURD, times the largest force.
+SAME_PLACE, CORRECTED, ABSURD = 1e-9, 1e-3, 1e100
 
 #: A common factor of the forces, or a symmetry of the array, explains errors if the correction by
 #: it leaves at most this part of the largest error.
@@ -133,8 +133,10 @@ class Claim(ABC):
         the claim holds, also with the default of `within`."""
         if self.holds_by_default or (nearby := self.nearby()) is None:
             return
-        values, true = (each / (self.largest or 1.0) for each in (self.values, nearby[0]))
-        if np.abs(values - true).max() <= CORRECTED:  # the statuses are wrong, not the forces
+        with np.errstate(over="ignore"):
+            values, true = (each / (self.largest or 1.0) for each in (self.values, nearby[0]))
+        apart = np.abs(values - true).max()
+        if not CORRECTED < apart < ABSURD:  # below, the statuses are wrong, not the forces
             return
         if moved := self._moved(values, true):
             yield f"the {self.many} are right with {moved}"

@@ -302,6 +302,12 @@ class NormalProblem:
         """[length] contact radii a_i = 1 / (2 E* h_i) for local compliances h."""
         return np.asarray((np.pi / 2.0) * self.influence.scale / compliance)
 
+    def energy(self, loads: Array, displacement: Array) -> float:
+        """The energy Phi(P), with D0 = 0 under load control; `displacement` is A P."""
+        local = 0.6 * loads @ hertz.indentation(loads, self.coefficients)
+        prescribed = self.offsets + (self.approach or 0.0)
+        return float(local + loads @ (0.5 * displacement - prescribed))
+
     def gap(self, loads: Array, displacement: Array, approach: float) -> Array:
         """(n,) g = k P^(2/3) + A P - D, the gradient of Phi; `displacement` is A P."""
         local: Array = hertz.indentation(loads, self.coefficients)
