@@ -24,6 +24,7 @@ import matplotlib
 from scene_files import FRICTION, HEXAGONAL, STAGES, scene_text
 
 from convexrough import cli
+from convexrough.__main__ import main
 
 RUN = ["run", "new.toml", "--out", "out", "--html", "--proof"]
 
@@ -127,9 +128,10 @@ def _forked(folder: Path, arguments: list[str], limit: int | None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         if limit is not None:
             resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+        sys.argv = ["convexrough", *arguments]
         status = 99
-        status = cli.main(arguments)
-    except KeyboardInterrupt:  # as the command begins or ends: `__main__` takes these
+        status = main()  # takes interrupts as the command begins or ends, and in callbacks
+    except KeyboardInterrupt:
         status = 130
     except BaseException:
         if status == 99:
