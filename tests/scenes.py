@@ -267,6 +267,5 @@ def lattice_operator(
     """The operator of points on a lattice, which is found if it is not given."""
     lattice = lattice or Lattice.through(points)
     sites = lattice.sites(points)
-    assert sites is not None
     layout = Layout(points, (lattice, sites))
     return LatticeInfluence(points, np.arange(len(points)), layout, lattice, scale)

@@ -114,7 +114,6 @@ def test_an_interrupt_at_any_moment(tmp_path: Path, delay: float) -> None:
     rough = HEXAGONAL.replace("0.0025", "1e-4").replace("0.02", "8e-4")
     (tmp_path / "a.toml").write_text(scene_text(rough + "height_std = 1e-7\nseed = 1"))
     running = scripted(tmp_path, INTERRUPTIBLE, "run", "a.toml")
-    assert running.stdout is not None
     running.stdout.readline()
     time.sleep(delay)
     running.send_signal(signal.SIGINT)

@@ -141,9 +141,7 @@ def test_parts_and_other_points(
 
 @pytest.mark.parametrize("balanced", [False, True])
 def test_steps_of_more_digits_than_single_precision_has(balanced: bool) -> None:
-    """The equation of the step holds to 1e-9. The sum of the loads is kept to seven digits of the
-    second part, which is below 1e-4 of the step.
-    """
+    """The sum of the loads is kept to seven digits of the second part, below 1e-4 of the step."""
     scene = bench.scene("lattice", 9.0)
     random = np.random.default_rng(1)
     A = couple(scene, np.arange(len(scene)), SCALE)
@@ -293,10 +291,7 @@ def test_shells_do_not_overlap(seed: int) -> None:
     touching = rng.random(120) < rng.random() ** 3
     radii = rng.lognormal(0, rng.choice([0.0, 0.0, 3.0]), 120) * touching
     inverse, share = inverse_distances(points, points), rng.choice([0.0, rng.random(), 1.0])
-    dense, mesh = (
-        DenseInfluence.assemble(points, SCALE),
-        ScatteredInfluence(points, SCALE),
-    )
+    dense, mesh = (DenseInfluence.assemble(points, SCALE), ScatteredInfluence(points, SCALE))
     for A in (scenes.lattice_operator(points, SCALE), mesh, dense):
         with np.errstate(divide="ignore"):
             fitted, halves = SCALE / A.fitted_shells(radii, share), SCALE / A.shells

@@ -29,7 +29,6 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> cr.SweepTable:
 @pytest.fixture
 def folder(whole: cr.SweepTable, tmp_path: Path) -> Path:
     """A copy of that folder."""
-    assert whole.folder is not None
     shutil.copytree(whole.folder.path, tmp_path / "a")
     return tmp_path / "a"
 
