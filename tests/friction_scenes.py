@@ -85,3 +85,7 @@ def around(load: float) -> cr.Contact:
 def shaded() -> cr.Scene:
     """A small low asperity between five crowded ones: pressed far, it loses load again."""
     return on_flat(ring(5), np.r_[0.05, np.ones(5)], np.r_[-0.06, np.zeros(5)])
+
+
+def lengths(vectors: np.ndarray) -> np.ndarray:
+    return np.hypot(*vectors.T)

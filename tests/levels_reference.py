@@ -219,9 +219,8 @@ class Bristles:
 
     Each asperity is a row of bristles in parallel, which together carry Mindlin's law (Popov's
     dimensional reduction): at the part s of a contact radius, s uniform on (0, reach), a bristle
-    is bent by at most C - s^2 C0, where C = k P^(2/3) is the indentation and C0 that of `contact`.
-    It is clamped to that, and remembers the rest. The error falls as the square of their number,
-    and with the steps.
+    is bent by at most C - s^2 C0, where C = k P^(2/3) is the indentation and C0 that of `contact`,
+    and remembers the rest. The error falls as the square of their number, and with the steps.
     """
 
     def __init__(self, contact: cr.Contact, count: int = 1000, reach: float = 1.0) -> None:

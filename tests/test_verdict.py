@@ -95,9 +95,8 @@ def test_a_small_load_that_is_missing_does_not_pass() -> None:
 
 
 def test_a_verdict_is_about_one_solution() -> None:
-    """Of two solutions, the certificate of these loads proves one, and Newton's method finds the
-    other. Both differ from the loads by 60 % of the largest load.
-    """
+    """Of two solutions, both 60 % of the largest load away, the certificate of these loads proves
+    one, and Newton's method finds the other."""
     x = [-0.0162845424986, -0.0160084160543, -0.0096381664579, -0.0094958173350, 0.0115592395980]
     y = [-0.0041901197099, -0.0040715169275, -0.0128326399868, -0.0127356954124, 0.0014032433119]
     tips = [0.0250543610961, 0.0176714912943, 0.0237542897971, 0.0130631034335, 0.0227821938681]

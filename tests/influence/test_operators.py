@@ -157,8 +157,7 @@ def test_steps_of_more_digits_than_single_precision_has(balanced: bool) -> None:
 
 def at_line(k: int, call: Callable[[], Any], other: Callable[[], Any]) -> tuple[Any, bool]:
     """What `call` returns if another thread calls `other` before its kth line in the module of
-    lattices, and whether there are so many lines.
-    """
+    lattices, and whether there are so many lines."""
     lines, before = itertools.count(), sys.gettrace()
 
     def trace(frame: FrameType, event: str, _: Any) -> Any:

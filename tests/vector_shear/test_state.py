@@ -1,12 +1,12 @@
 """Vector friction: states, as a cone program, and statuses and bounds under attack."""
 
 import re
-from functools import cache, partial
+from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
-from friction_scenes import FRICTION, in_doubt, pressed, shaded, with_friction
+from friction_scenes import FRICTION, in_doubt, lengths, pressed, shaded, with_friction
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from multiprecision import NotProved
@@ -20,8 +20,6 @@ from convexrough.arithmetic.balls import Ball
 from convexrough.vector_shear import cones
 from convexrough.vector_shear.certificate import certify_vectors
 from convexrough.vector_shear.problem import FrictionProblem, VectorState
-
-lengths = partial(np.linalg.norm, axis=1)
 
 FRACTIONS = [1e-9, 1e-3, 0.1, 0.3, 0.5, 0.8, 0.99]
 NAMES = ["paper", "rough", "steel", "rough, closest"]
