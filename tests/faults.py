@@ -131,8 +131,6 @@ def _forked(folder: Path, arguments: list[str], limit: int | None) -> int:
         sys.argv = ["convexrough", *arguments]
         status = 99
         status = main()  # takes interrupts as the command begins or ends, and in callbacks
-    except KeyboardInterrupt:
-        status = 130
     except BaseException:
         if status == 99:
             os.write(2, traceback.format_exc().encode())

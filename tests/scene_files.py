@@ -142,7 +142,8 @@ def put(folder: Path, made: Any, name: str = "loads.csv") -> str:
                 page.append(row)
         book.save(path)
     elif kind == "parquet":
-        pytest.importorskip("pandas").DataFrame(made).to_parquet(path)
+        arrow, parquet = map(pytest.importorskip, ("pyarrow", "pyarrow.parquet"))
+        parquet.write_table(arrow.table(made), path)
     else:
         content = (made if isinstance(made, str) else lines(made)).encode()
         path.write_bytes(gzip.compress(content) if kind == "gz" else content)

@@ -42,6 +42,7 @@ def judged(
     if found.scope == "none":
         assert (found.status == "undecided").all()
         assert np.isinf([found.load_errors, found.gap_errors]).all()
+        assert found.approach_error == (np.inf if "load" in control else 0.0)
     else:
         assert_honest(found, loads, exactly(scene, **control))
     return found
