@@ -8,7 +8,7 @@ inverse; for more, from `friction.sweeping`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from itertools import pairwise
 from typing import Any, Literal, NamedTuple
@@ -134,24 +134,31 @@ def proved_in_rows(rows: Stack, box: Box, high: Rows, low: Rows) -> NDArray[np.b
     shells = [it.influence.scale * c for it, c in zip(alike, span.c, strict=True)]
     each = zip(alike, shells, strict=True)
     proved = np.array([order_holds(it.scene, it.influence, own) for it, own in each])
-    rest = np.flatnonzero(~proved & span.regular[:, 0])  # theorem 3 may prove these
-    if len(rest) == 0:
-        return proved
-    rows, span, left = rows.only(rest), span.only(rest), [alike[k].influence for k in rest]
-    entry_error = np.array([[it.entry_error] for it in left])
+    rest = np.flatnonzero(~proved & span.regular[:, 0])
+    if len(rest):
+        left = [alike[k].influence for k in rest]
+        proved[rest] = _proved_by_inverses(rows.only(rest), span.only(rest), left)
+    return proved
+
+
+def _proved_by_inverses(
+    rows: Stack, span: _Span, operators: Sequence[Influence]
+) -> NDArray[np.bool_]:
+    """(m,) `proved_in_rows` by theorem 3."""
+    entry_error = np.array([[each.entry_error] for each in operators])
     lost = 1.01 * (entry_error + (span.c.shape[1] + 2) * ROUNDOFF)
     rates = 1.0 - rows.apply(span.c) * (1 + lost + SAFETY) - SAFETY
-    tried = span.support | span.unsettled(rates, span.support)
-    order = np.argsort(~span.support * 1 + ~tried, axis=1, kind="stable")
-    known, count = (max(1, int(it.sum(axis=1).max())) for it in (tried, span.support))
-    order = order[:, :known]
+    left = span.support | span.unsettled(rates, span.support)
+    order = np.argsort(~span.support * 1 + ~left, axis=1, kind="stable")
+    known, count = (max(1, int(each.sum(axis=1).max())) for each in (left, span.support))
+    order, proved = order[:, :known], np.empty(len(order), dtype=bool)
     entries = np.empty((*order.shape, count))
-    for own, A, it in zip(entries, left, order, strict=True):
+    for own, A, it in zip(entries, operators, order, strict=True):
         own[...] = A.matrix.take(it, 0).take(it[:count], 1)
     for some in threads.chunks(len(order), max(1, TOGETHER // (known * count))):
         part = span.only(some)
         given = rates[some], part.support, order[some], entries[some], entry_error[some]
-        proved[rest[some]] = part.settled(*given)
+        proved[some] = part.settled(*given)
     return proved
 
 
