@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from convexrough.comparison import compare, every_solver
-from convexrough.gallery.cases import case
+from convexrough.gallery.cases import case, names
 from convexrough.progress import LOGGER
 from convexrough.solvers import Newton, Solver
 
@@ -19,11 +19,13 @@ FACTORS = (1, 2, 5, 10, 100)
 WITHIN = 1e-3
 
 
-def profile_of(solvers: Sequence[Solver] | None, cases: Sequence[str]) -> list[dict[str, Any]]:
+def profile_of(
+    solvers: Sequence[Solver] | None = None, *, cases: Sequence[str] = ()
+) -> list[dict[str, Any]]:
     """A row for each solver, run once on each hard case (Dolan and More, Math. Program. 91, 201).
 
-    solvers : None for every solver of `compare`; Newton's method is always first
-    cases   : names of cases
+    solvers : solver objects; default: every solver of `compare`. Newton's method is always first
+    cases   : names of cases or families; default: all
 
     A row contains the numbers of cases with each outcome ("right", "wrong", "refused", "failed"),
     and of those in which exactly the asperities that touch have a load. Further entries are the
@@ -31,7 +33,7 @@ def profile_of(solvers: Sequence[Solver] | None, cases: Sequence[str]) -> list[d
     `outcomes` by case.
     """
     solvers = [Newton(), *(s for s in solvers or every_solver() if s != Newton())]
-    said = [each.name for each in solvers]
+    cases, said = names(*cases), [each.name for each in solvers]
     seconds = np.full((len(solvers), len(cases)), np.inf)
     outcomes = np.full(seconds.shape, "", dtype="U8")
     sets = np.zeros(seconds.shape, dtype=bool)

@@ -99,7 +99,8 @@ class Bench:
         return [row for row in rows if row.asperities >= least]
 
     def exponent(self, family: Family) -> float:
-        """The exponent b of the time n^b to press n >= `FITTED_FROM` asperities; nan if unknown."""
+        """The exponent b of the time n^b to press n >= `FITTED_FROM` asperities, by least squares
+        of logarithms; nan for fewer than two sizes."""
         large = [(row.asperities, row.seconds) for row in self.presses(family, FITTED_FROM)]
         if len({size for size, _ in large}) < 2:
             return math.nan

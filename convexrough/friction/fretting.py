@@ -73,6 +73,8 @@ def fretting(cycle: Cycle) -> Fretting:
 
     docs/theory/losses.md, "Slip and traction inside a contact", gives the formulas.
 
+    Raises InputError if `cycle` is not a `Cycle`.
+
     >>> worn = cr.fretting(cr.cycle(contact, maximum=0.1 * contact.load))
     >>> bool((worn.mean_tractions <= worn.largest_tractions).all())
     True

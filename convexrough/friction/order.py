@@ -23,7 +23,7 @@ from convexrough.convex.newton_step import correct
 from convexrough.errors import SolverError
 from convexrough.friction.spacing import order_holds, settled_by_rings
 from convexrough.friction.sweeping import swept_rates
-from convexrough.influence.coupling import inverse_distances
+from convexrough.influence.coupling import Influence, inverse_distances
 from convexrough.influence.lattice import LatticeInfluence
 from convexrough.normal.boxes import Box
 from convexrough.normal.level import Level, Rows, rows_of

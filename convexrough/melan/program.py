@@ -46,6 +46,7 @@ def solve(contact: Contact, mean: Array, vertices: Array) -> dict[str, Any]:
     whole = mean[None], vertices[:, None] / unit, np.array([contact.load / unit])
     return {
         "factor": factor,
+        "limited_by": "sliding",
         "lower": _lower(known, rest, mean, elastic, errors),
         "upper": _upper(known, slips, mean, elastic, errors),
         "factors": np.where(contact.loads > 0, factor, np.nan),

@@ -80,8 +80,8 @@ class Shakedown(Table, Plottable):
     force: float | Array
     load_amplitudes: Array
     force_amplitudes: Array
+    limited_by: Literal["sliding", "opening"] | None
     order: Order | None = None
-    limited_by: Literal["sliding", "opening"] | None = "sliding"
 
     @property
     def gap(self) -> float:
@@ -274,6 +274,7 @@ def _elastic(contact: Contact, t0: Fraction, t: Any) -> dict[str, Any]:
     factors[problem.touching] = limits
     return {
         "factor": factor,
+        "limited_by": "sliding",
         "lower": max(min(float(each.lower.min()), gross), 0.0) * (1 - SAFETY) if proved else 0.0,
         "upper": min(float(each.upper.min()), gross) * (1 + SAFETY) if proved else np.inf,
         "factors": factors,

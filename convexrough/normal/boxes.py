@@ -6,9 +6,9 @@ is the local compliance at the upper ends of a box (`NormalProblem.compliance`),
 matrix of the h, and A the compliance operator. On the box the Hessian of the energy is at least
 mu H, with the margin mu = 1 - `convexity_number`.
 
-Overlapping shells about the asperities may prove the convexity then: "Shells that overlap" there
-defines their sparse matrix S, and the energy U_ij of two shells. The lengths are t_i = 1 / (pi E*
-h_i), and the distances r_ij.
+In crowded contacts, overlapping shells about the asperities may prove the convexity:
+docs/theory/crowded.md, "Shells that overlap", defines their sparse matrix S, with the energy U_ij
+of two shells, the lengths t_i = 1 / (pi E* h_i), and the distances r_ij.
 """
 
 from __future__ import annotations

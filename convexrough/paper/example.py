@@ -43,7 +43,8 @@ READ_CROSSING = 0.37
 
 
 class PaperStates:
-    """The results that the paper's figures, their tables and the comparison of numbers show.
+    """The results that the paper's figures, their tables and the comparison of numbers show, of a
+    contact in six rings, as in the paper.
 
     named  : indices of touching asperities by the letter of their ring, from the axis outwards to
         ring A;  firsts : the first of each ring

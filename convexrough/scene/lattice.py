@@ -74,7 +74,8 @@ class Lattice(Cached):
     @classmethod
     def through(cls, points: Array) -> Lattice | None:
         """The lattice on which these points (n, 2) lie, up to rounding, each on its own site; None
-        if its spacing is too small for float64, or if it has far more sites than points."""
+        if there is none, or only one with far more sites, or with too small a spacing for float64.
+        """
         anchor = points[np.argmin(((points - points.mean(axis=0)) ** 2).sum(axis=1))]
         basis, reach = _shortest(points - anchor), float(np.abs(points).max())
         if basis is None or np.hypot(*basis[0]) < max(SMALLEST, FINEST * reach):

@@ -137,7 +137,8 @@ class FrictionProblem:
         return self.levels.top.tangent.loads[self.places]
 
     def from_rest(self, height: Fraction) -> tuple[Array, Array]:
-        """(n,) forces u, and sums eta of deflection and slip, from `shear` at T [force]."""
+        """(n,) scaled forces u, and sums eta of deflection and slip, from `shear` at `height`, the
+        tangential force T = Q / f [force]."""
         if height < ELASTIC * self.levels.load:
             shares = self.elastic.value * float(height / Fraction(self.units.force))
             return shares, shares * self.compliance
