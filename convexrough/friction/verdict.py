@@ -104,8 +104,10 @@ def verify_shear(
     within: float = WITHIN,
     sliding: ArrayLike | None = None,
 ) -> ShearVerdict:
-    """The verdict on shear forces (n,) with the sum `force`, claimed to slide where `sliding` (n,),
-    by default where `claims_sliding`."""
+    """The verdict on shear forces (n,) with the prescribed sum `force`.
+
+    sliding : (n,) true where an asperity is claimed to slide; default: `claims_sliding`
+    """
     checks.instance("contact", contact, Contact)
     within = tolerance("within", within)
     given = checks.array("forces", forces, length=len(contact.scene))

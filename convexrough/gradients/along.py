@@ -117,8 +117,10 @@ class Along:
 
     @cached_property
     def sums(self) -> tuple[Sums, Sums]:
-        """Weights in the sums of losses over c_t f^2, and of displacements over c_t f (Mindlin's
-        ratio c_t)."""
+        """Weights at each level, in the sum of losses and in the sum of displacements.
+
+        The sums are divided by c_t f^2 and by c_t f, with c_t = tangential / normal compliance.
+        """
         lost, moved = Sums(), Sums()
         for step, curve, pieces in zip(self.steps, self.walk.curves, self.walk.pieces, strict=True):
             _, loss, displacement = step
@@ -132,7 +134,10 @@ class Along:
         return lost, moved
 
     def parts(self, moves: Moves) -> tuple[list[Part], list[Part]]:
-        """The parts of the weighted sums of losses and of displacements, if every level `moves`."""
+        """The parts of the weighted sum of losses, and those of the sum of displacements.
+
+        moves : derivatives of the total load of every level with respect to parameters, at fixed T
+        """
         (lost, moved), at, force = self.sums, self.known.at, self.known.units.force
         unit, travel = self.known.loss_unit, self.known.travel_unit
         return [

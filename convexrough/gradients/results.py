@@ -245,16 +245,20 @@ def cycle_gradient(cycle: Cycle, *, holding: Holding | None = None) -> Gradient:
 
 
 def path_gradient(
-    path: LoadPath, holding: Holding | None = None, **weights: ArrayLike | None
+    path: LoadPath,
+    holding: Holding | None = None,
+    *,
+    losses: ArrayLike | None = None,
+    displacements: ArrayLike | None = None,
 ) -> Gradient:
     """The result of `LoadPath.gradient`."""
     known, m = with_friction(path), len(path.forces)
     holding = control_held(path.contact, holding)
     spent, far = (
         checks.array(name, 0.0 if given is None else given, length=m, one="force")
-        for name, given in weights.items()
+        for name, given in (("losses", losses), ("displacements", displacements))
     )
-    if all(given is None for given in weights.values()):
+    if losses is None and displacements is None:
         spent = np.eye(m)[-1]
     # A loss on one segment is part of all later losses.
     later = [*accumulate(map(Fraction, spent[::-1].tolist()))][::-1]
