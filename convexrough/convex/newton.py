@@ -25,7 +25,7 @@ from convexrough.progress import log_step
 #: The linear system of a step is solved to this relative residual or, if that is smaller, to the
 #: square of the factor by which the last step reduced the defect (Eisenstat and Walker, SIAM J.
 #: Sci. Comput. 17 (1996) 16, choice 2).
-MOST_LEFT = 0.1
+MOST_LEFT = 0.03
 
 #: Least residual to which the linear system is solved, as a fraction of the defect at which the
 #: method stops. A heuristic.

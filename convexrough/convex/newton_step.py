@@ -9,9 +9,8 @@ a point with the defect F is
 If the loads must keep their sum, beta is the number for which sum W y = 0; otherwise beta is 0. The
 matrix I + W A W is positive definite where the energy is convex. If it is not, diag(`shells`) is
 added to A. By the shell lemma (docs/theory/convexity.md) the sum is positive semidefinite, so I + W
-(A + diag(`shells`)) W is positive definite. Conjugate gradients also give A W y, from which the
-step d follows for every asperity, touching or open. Cholesky's method factorises diag(1 / c) + A
-instead, with the unknown W y.
+(A + diag(`shells`)) W is positive definite. Cholesky's method factorises diag(1 / c) + A instead,
+with the unknown W y.
 """
 
 from __future__ import annotations
@@ -144,6 +143,9 @@ def _iterate(
     """The step by preconditioned conjugate gradients (docs/theory/newton.md, "Many asperities");
     None if the matrix is not positive definite.
 
+    The step is beta - F - A W y where an asperity is open, and (I + W diag(`shells`) W) y / W where
+    one touches. Without shells it leaves -r / W of F, with the residual r of the linear system.
+
     If balanced, the results of the preconditioner M are projected onto the plane sum W y = 0
     (Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23 (2001) 1376). Each projection also adds a
     factor times the diagonal of W to the residual, so that single precision is enough. The sum of
@@ -157,56 +159,49 @@ def _iterate(
     enough = max(tolerance, limit) * float(np.linalg.norm(defect)) / size
     w: Values = root.astype(dtype)
     diagonal = dtype(1) if shells is None else (1.0 + root * shells * root).astype(dtype)
-    border = smooth(w)[0] if smooth and balanced else w
+    border = smooth(w) if smooth and balanced else w
     weight, beta = float(w @ border), 0.0
+    inverse = np.divide(1, w, out=np.zeros_like(w), where=w >= np.finfo(dtype).tiny)
 
-    def smoothed(residual: Values) -> tuple[Values, float, float]:
-        """M r for the residual r, projected; the 2-norm of A W r; and r' M r without projection.
-        If balanced, `residual` is changed in place.
+    def smoothed(residual: Values) -> tuple[Values, float]:
+        """M r for the residual r, projected; and r' M r without projection. If balanced, `residual`
+        is changed in place.
         """
         nonlocal beta
-        if smooth:
-            z, left = smooth(residual)
-        else:
-            z, left = residual.copy(), float(np.linalg.norm(influence.apply(w * residual)))
+        z = smooth(residual) if smooth else residual.copy()
         whole = float(residual @ z)
         if balanced:
             off = -float(w @ z) / weight
             beta += off
             residual += dtype(off) * w
             z += dtype(off) * border
-        return z, left, whole
+        return z, whole
 
     y = dtype(total / (size * weight)) * border
-    y_displacement = influence.apply(w * y) if total else np.zeros_like(w)  # A W y
-    residual: Values = -w * ((defect / size).astype(dtype) + y_displacement) - diagonal * y
-    z, left, first = smoothed(residual)
+    product = influence.apply(w * y) if total else np.zeros_like(w)  # A W y
+    residual: Values = -w * ((defect / size).astype(dtype) + product) - diagonal * y
+    z, first = smoothed(residual)
     p = z.copy()
     squared = float(residual @ z)  # r' M r
-    products = 0
-    lacking = 1.0  # factor by which `left` may be too small
-    while squared > (ENERGY * limit) ** 2 * first and products < MOST_ITERATIONS:
-        if lacking * left <= enough:
-            if not smooth or influence.even:
-                break
-            exact = float(np.linalg.norm(influence.apply(w * residual)))
-            if exact <= enough:
-                break
-            lacking = 2.0 * exact / left
+    for _ in range(MOST_ITERATIONS):
+        left = float(np.linalg.norm(residual * inverse))
+        if left <= enough or squared <= (ENERGY * limit) ** 2 * first:
+            break
         q = influence.apply(w * p)
-        products += 1
         bent = w * q
         bent += diagonal * p
         curvature = float(p @ bent)
         if curvature <= 0:
             return None
         length = dtype(squared / curvature)
+        y += length * p
         q *= length
-        y_displacement += q
+        product += q
         bent *= length
         residual -= bent
-        z, left, _ = smoothed(residual)
+        z, _ = smoothed(residual)
         before, squared = squared, float(residual @ z)
         p *= dtype(squared / before)
         p += z
-    return size * (beta - y_displacement.astype(np.float64)) - defect
+    step = np.where(inverse > 0, diagonal * y * inverse, beta - product - defect / size)
+    return np.asarray(size * step)

@@ -40,9 +40,9 @@ ENTRIES = 2**15
 #: Ways to compute the operator: a matrix, transforms on a lattice, transforms on a mesh.
 Kind = Literal["dense", "lattice", "scattered"]
 
-#: A function of a vector r that returns estimates of (I + W A W)^-1 r and of the 2-norm of A W r,
-#: with the diagonal matrix W of `Influence.smoother`.
-Smoother = Callable[[NDArray[Any]], tuple[NDArray[Any], float]]
+#: A function of a vector r that returns an estimate of (I + W A W)^-1 r, with the diagonal matrix W
+#: of `Influence.smoother`.
+Smoother = Callable[[NDArray[Any]], NDArray[Any]]
 
 
 class Rounding(NamedTuple):
@@ -90,8 +90,6 @@ class Influence(Coupling):
     name: ClassVar[Kind]
     #: True if the matrix is stored; if False, products with float32 loads are cheaper.
     stored: ClassVar[bool] = False
-    #: True if points are nowhere far denser than elsewhere, so that estimates by `smoother` hold.
-    even: ClassVar[bool] = False
     #: True if `sums` takes only a few times as long as `apply`. Then Newton's method may end early,
     #: and `normal.refine` makes the last steps with `sums`.
     cheap_sums: ClassVar[bool] = False

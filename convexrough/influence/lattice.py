@@ -71,7 +71,6 @@ class LatticeInfluence(coupling.Influence):
     point_error: float = 0.0
 
     name: ClassVar[coupling.Kind] = "lattice"
-    even: ClassVar[bool] = True
     cheap_sums: ClassVar[bool] = True
 
     @cached_property

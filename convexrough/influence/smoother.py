@@ -132,25 +132,17 @@ class Blocks:
         displacement = np.float32(self.scale) * middle * (self.spectrum + np.float32(own))
         removed = 1.0 - 1.0 / np.maximum(1.0 + middle * displacement, np.float32(LEAST))
         removed *= passed
-        energies = displacement * displacement
-        energies[:, 1 : (size[1] + 1) // 2] *= 2  # each wave stands for its conjugate, too
-        energies *= np.float32(BLOCK**2 / math.prod(size))
 
-        def smooth(values: NDArray[Any]) -> tuple[NDArray[Any], float]:
-            left = np.zeros(removed.shape[1])
+        def remove(waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
+            waves[0] *= removed[:, each]
+            return waves
 
-            def remove(waves: list[NDArray[Any]], each: slice) -> list[NDArray[Any]]:
-                power = np.square(waves[0].real)
-                power += np.square(waves[0].imag)
-                left[each] = np.einsum("ij,ij->j", power, energies[:, each])
-                waves[0] *= removed[:, each]
-                return waves
-
+        def smooth(values: NDArray[Any]) -> NDArray[Any]:
             field = through_waves([self._sums(q * values)], size, workers, remove)[0]
             averages = field.take(block)
             averages *= q
             np.subtract(values, averages, out=averages)
-            return averages, math.sqrt(left.sum())
+            return averages
 
         return smooth
 
