@@ -106,8 +106,8 @@ class Levels:
     def _solved(self, problem: NormalProblem) -> Level:
         """The level of `problem`, proved in the box of `top` (`Box.closed`).
 
-        The problem is solved without initial loads, unless this box is local. If this proves
-        nothing, it is solved from the loads of `top`.
+        The problem is solved without initial loads, unless this box is local and the matrix is
+        stored. If this proves nothing, it is solved from the loads of `top`.
         """
         box, trial = self.top.box, self.top.trial
         from_top = None if box is None or trial is None else trial.loads.high
@@ -118,7 +118,7 @@ class Levels:
                 state = trial if is_of(trial, problem, loads) else refined_loads(problem, loads)
                 return proved(problem, state, box and box.closed(problem))
 
-        if box is not None and box.scope == "local":
+        if box is not None and box.scope == "local" and problem.influence.stored:
             return sought(from_top)
         found = sought(None)
         if found.obstacle and from_top is not None:
