@@ -60,8 +60,6 @@ class Cycle(Table, Plottable):
     slip_errors, stick_radius_errors : [length] proved bounds on the errors of these two
     level, force_level : [force] L* and f T*: from the second cycle on the memory curve
         (docs/theory/paths.md) is the same at every moment up to the load L*; nan for general steps
-    balance_defect   : relative difference between `loss` and the loss by (1) of
-        docs/theory/losses.md, as a check of rounding; nan unless `one_loop`, or for general steps
     loss_normalised  : loss / W0, with W0 = 9 (2 - nu) f^2 P^2 / (5 G a_H). P is the highest load,
         nu Poisson's ratio, G the shear modulus, a_H the contact radius of a smooth sphere under P;
         for an ellipsoid W0 = (24/5) c_t f^2 P D with its approach D and Mindlin's ratio c_t
@@ -83,7 +81,7 @@ class Cycle(Table, Plottable):
     0.0488 0.009131
     """
 
-    _shown = ("secant_stiffness", "loss_factor")
+    _shown = ("secant_stiffness", "loss_factor", "balance_defect")
     _along: ClassVar[Along] = {
         ("asperity",): (
             *("status", "partial_slip_losses", "sliding_losses", "slips", "slip_errors"),
@@ -106,7 +104,6 @@ class Cycle(Table, Plottable):
     stick_radius_errors: Array
     level: float
     force_level: float
-    balance_defect: float
     loss_normalised: float
     smooth_normalised: float
     displacement_amplitude: float
@@ -179,6 +176,18 @@ class Cycle(Table, Plottable):
     def one_loop(self) -> bool:
         """True if, at constant load, the shear force rises and falls once in a cycle."""
         return self._walk.one_loop
+
+    @cached_property
+    def balance_defect(self) -> float:
+        """Relative difference between `loss` and the loss by (1) of docs/theory/losses.md, as a
+        check of rounding; nan unless `one_loop`, or for general steps."""
+        closed, levels = self._walk, self._walk.levels
+        if not closed.one_loop or closed.general is not None:
+            return np.nan
+        top, rest = levels.at(levels.load), levels.at(closed.stuck[0])
+        mean, run = (top.approach + rest.approach) * 0.5, top.load - rest.load
+        other = (top.energy - rest.energy - run * mean) * 8.0 * levels.loss_unit
+        return abs(float(other.value) - self.loss) / (self.loss or 1.0)
 
     @property
     def force_amplitude(self) -> float:

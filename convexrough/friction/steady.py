@@ -182,15 +182,11 @@ def _cycle(contact: Contact, closed: Closed, spent: Ball, moved: Ball) -> Cycle:
     radii, radius_errors = state.stick_radii(levels, rest)
     loaded, heights = zip(*closed.points[: closed.once], strict=True)
     reference = smooth_reference(contact.scene, contact.load) if levels.load else None
-    defect = smooth = np.nan
-    if closed.one_loop:
-        mean, run = (top.approach + rest.approach) * 0.5, top.load - rest.load
-        other = (top.energy - rest.energy - run * mean) * 8.0 * levels.loss_unit
-        defect = abs(float(other.value) - loss) / (loss or 1.0)
-        if reference:
-            smooth = float(mindlin.loss(float((max(heights) - min(heights)) / (2 * levels.load))))
+    smooth = np.nan
+    if closed.one_loop and reference:
+        smooth = float(mindlin.loss(float((max(heights) - min(heights)) / (2 * levels.load))))
     if (general := closed.general) is not None:
-        each, defect = closed.losses_of(general), np.nan
+        each = closed.losses_of(general)
         first, loss = each[0], each[-1] if closed.settled(each) else np.nan
         amplitude = float(np.ptp(general.states.displacements.value[-closed.once - 1 :])) / 2.0
     unknown = np.inf if order == "fails" else 0.0
@@ -216,7 +212,6 @@ def _cycle(contact: Contact, closed: Closed, spent: Ball, moved: Ball) -> Cycle:
         stick_radius_errors=frozen(radius_errors + unknown),
         level=float(stuck) + unused,
         force_level=float(levels.coefficient.value) * float(stuck_height) + unused,
-        balance_defect=defect,
         loss_normalised=float(loss) / (reference.energy_scale if reference else np.nan),
         smooth_normalised=smooth,
         displacement_amplitude=amplitude,

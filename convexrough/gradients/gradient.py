@@ -188,8 +188,6 @@ class Gradient(Table, Plottable):
         derivatives from below and above differ, as at a point that agrees with an earlier point
         (up to rounding)
     force_sides, load_sides : (m, 2) the derivatives by `forces` and `loads` from below and above
-    balance_defect  : difference between two formulas for the derivative by the modulus, divided by
-        the largest term of both formulas; a check of rounding
     """
 
     _along: ClassVar[Along] = {
@@ -198,7 +196,7 @@ class Gradient(Table, Plottable):
         ("point",): ("forces", "force_errors", "loads", "load_errors"),
         ("point", "side"): ("force_sides", "load_sides"),
     }
-    _shown = ("positions", "position_errors")
+    _shown = ("positions", "position_errors", "balance_defect")
 
     contact: Contact
     holding: Holding
@@ -212,7 +210,6 @@ class Gradient(Table, Plottable):
     contact_modulus_error: float
     poisson_ratio: float
     poisson_ratio_error: float
-    balance_defect: float
     number: Number = field(repr=False)
     shown: Number = field(repr=False)
     sphere_radius: float | None = None
@@ -257,8 +254,13 @@ class Gradient(Table, Plottable):
         ):
             found[name] = frozen(to_scene(each.value))
             found[f"{one}_errors"] = frozen(to_scene(each.error))
-        defect = shown.balance_defect
-        return cls(contact, holding, balance_defect=defect, number=number, shown=shown, **found)
+        return cls(contact, holding, number=number, shown=shown, **found)
+
+    @property
+    def balance_defect(self) -> float:
+        """Difference between two formulas for the derivative by the modulus, divided by the largest
+        term of both formulas; a check of rounding."""
+        return self.shown.balance_defect
 
     @cached_property
     def positions(self) -> Array:

@@ -234,7 +234,7 @@ class Level:
         def weighted(values: Array) -> float:  # errors may be infinite where c is 0
             return float(np.sqrt((c[sprung] * values[sprung] ** 2).sum()))
 
-        nothing, sharp, halved = Pair.exact(np.zeros(len(c))), False, True
+        nothing, sharp, halved = Pair.exact(np.zeros(len(c))), problem.few, True
         x = completed(Pair.exact(float(total.value) * weights))
         product = problem.moved(nothing, Ball.exact(nothing), x)
         left, beta = residual(x, product)

@@ -174,13 +174,17 @@ class NormalProblem:
         return Ball.around(product, errors * (1 + SAFETY))
 
     @property
+    def few(self) -> bool:
+        """True for a stored matrix of so few rows that each `product` is cheap."""
+        return self.influence.stored and len(self) <= ALL_SHARP
+
+    @property
     def precise(self) -> bool:
         """True if `pressed_product` has all digits that friction needs."""
         A = self.influence
         if self.sharp or not isinstance(A, LatticeInfluence | DenseInfluence):
             return True
-        few = len(self) <= ALL_SHARP
-        return A.slices == A.least_slices if isinstance(A, LatticeInfluence) else few
+        return A.slices == A.least_slices if isinstance(A, LatticeInfluence) else self.few
 
     def pressed_product(self, loads: Pair) -> Ball:
         """(n,) A P for loads P >= 0, precise enough for a press: unless the problem is `precise`,
@@ -216,8 +220,7 @@ class NormalProblem:
         """(n,) A times `others`, if possible from `product`, which is A times `loads`."""
         change = (others - loads).high
         small = NEARBY * float(loads.high.max())
-        few = self.influence.stored and len(self) <= ALL_SHARP
-        if few and float(np.abs(change).max()) > small:
+        if self.few and float(np.abs(change).max()) > small:
             return self.product(others)
         moved, off = self.influence.apply(change), self.influence.rounding(change)
         most = self.row_norm * float(np.linalg.norm(change))  # bounds A |change|
