@@ -140,19 +140,20 @@ def test_parts_and_other_points(
 
 
 @pytest.mark.parametrize("balanced", [False, True])
-def test_steps_of_more_digits_than_single_precision_has(balanced: bool) -> None:
-    """The sum of the loads is kept to seven digits of the second part, below 1e-4 of the step."""
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-10])  # single precision has fewer digits than 1e-10
+def test_steps_are_as_accurate_as_asked_for(balanced: bool, tolerance: float) -> None:
     scene = bench.scene("lattice", 9.0)
     random = np.random.default_rng(1)
     A = couple(scene, np.arange(len(scene)), SCALE)
     c = random.uniform(0.02, 0.2, len(scene)) * scene.asperities.lattice.spacing / SCALE
+    c *= random.random(len(scene)) < 0.9  # the others are open
     defect = random.normal(size=len(scene))
-    step = correct(A, A.shells, np.sqrt(c), defect, balanced=balanced, tolerance=1e-10)
+    step = correct(A, A.shells, np.sqrt(c), defect, balanced=balanced, tolerance=tolerance)
     left = step + A.apply(c * step) + defect
     if balanced:
-        assert abs(c @ step) <= 1e-11 * np.abs(c * step).sum()
-        left -= (c @ left) / c.sum()
-    assert np.linalg.norm(left) <= 1e-9 * np.linalg.norm(defect)
+        assert abs(c @ step) <= 0.1 * tolerance * np.abs(c * step).sum()
+        left -= np.median(left[c == 0.0])  # beta: nothing else is left where asperities are open
+    assert np.linalg.norm(left) <= 1.1 * tolerance * np.linalg.norm(defect)
 
 
 def at_line(k: int, call: Callable[[], Any], other: Callable[[], Any]) -> tuple[Any, bool]:
