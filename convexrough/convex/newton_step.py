@@ -43,6 +43,9 @@ TWICE = 30.0
 
 MOST_ITERATIONS = 500
 
+#: Asperities move as open ones do if their entry of W is at most SMALL times the largest.
+SMALL = 1e-3
+
 #: Smaller slopes dP/d(delta), in scaled units, count as 0.
 LEAST_SLOPE = 2.0**-500
 
@@ -144,7 +147,8 @@ def _iterate(
     None if the matrix is not positive definite.
 
     The step is beta - F - A W y where an asperity is open, and (I + W diag(`shells`) W) y / W where
-    one touches. Without shells it leaves -r / W of F, with the residual r of the linear system.
+    one touches. Without shells F + F' d is then beta, minus r / W where asperities touch, with the
+    residual r of the linear system.
 
     If balanced, the results of the preconditioner M are projected onto the plane sum W y = 0
     (Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23 (2001) 1376). Each projection also adds a
@@ -161,7 +165,7 @@ def _iterate(
     diagonal = dtype(1) if shells is None else (1.0 + root * shells * root).astype(dtype)
     border = smooth(w) if smooth and balanced else w
     weight, beta = float(w @ border), 0.0
-    inverse = np.divide(1, w, out=np.zeros_like(w), where=w >= np.finfo(dtype).tiny)
+    inverse = np.divide(1, w, out=np.zeros_like(w), where=w > SMALL * w.max())
 
     def smoothed(residual: Values) -> tuple[Values, float]:
         """M r for the residual r, projected; and r' M r without projection. If balanced, `residual`

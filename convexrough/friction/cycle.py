@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -112,6 +112,9 @@ class Cycle(Table, Plottable):
     presses: int
     start: float = field(repr=False)
     heights: tuple[Fraction, ...] = field(repr=False)
+
+    def __getstate__(self) -> dict[str, Any]:  # a pickle has no levels
+        return super().__getstate__() | {"balance_defect": self.balance_defect}
 
     @property
     def scene(self) -> Scene:

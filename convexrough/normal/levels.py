@@ -106,8 +106,8 @@ class Levels:
     def _solved(self, problem: NormalProblem) -> Level:
         """The level of `problem`, proved in the box of `top` (`Box.closed`).
 
-        The problem is solved without initial loads, unless this box is local and the matrix is
-        stored. If this proves nothing, it is solved from the loads of `top`.
+        If this box is local and the matrix is stored, the problem is solved from the loads of
+        `top`; else without initial loads and, if this proves nothing, from those of `top`.
         """
         box, trial = self.top.box, self.top.trial
         from_top = None if box is None or trial is None else trial.loads.high

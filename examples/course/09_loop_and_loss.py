@@ -80,7 +80,7 @@ assert abs(naive_loss(1e-6) / tiny.loss - 1) > 10
 #
 # Add up the losses of the asperities, none of which is negative: Mindlin's loss, to which an
 # asperity that slides by :math:`s_i` adds :math:`4 f P_i s_i`. ``cycle`` does this.
-# Its field ``balance_defect`` is the relative difference from the formula above, evaluated to
+# Its number ``balance_defect`` is the relative difference from the formula above, evaluated to
 # thirty digits; because of cancellation it can reach :math:`10^{-28} (f P / Q)^3`, or some
 # thousand times as much on a large lattice, whose products have fewer digits.
 

@@ -142,8 +142,7 @@ def test_parts_and_other_points(
 @pytest.mark.parametrize("balanced", [False, True])
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-10])  # single precision has fewer digits than 1e-10
 def test_steps_are_as_accurate_as_asked_for(balanced: bool, tolerance: float) -> None:
-    scene = bench.scene("lattice", 9.0)
-    random = np.random.default_rng(1)
+    scene, random = bench.scene("lattice", 9.0), np.random.default_rng(1)
     A = couple(scene, np.arange(len(scene)), SCALE)
     c = random.uniform(0.02, 0.2, len(scene)) * scene.asperities.lattice.spacing / SCALE
     c *= random.random(len(scene)) < 0.9  # the others are open

@@ -223,7 +223,7 @@ def test_newton_converges_from_any_start(sampled: scenes.Case, seed: int, size: 
 
 
 def test_newton_converges_where_distances_are_graded() -> None:
-    """Along a geometric line: blocks average over whole parts, and estimates are far too low."""
+    """Along a geometric line: blocks average over whole parts; the preconditioner helps little."""
     random, n = np.random.default_rng(0), 2600
     x = np.exp(12.0 * np.arange(n) / n)
     gaps = np.diff(x)
