@@ -140,7 +140,8 @@ def product(level: Level, weights: Ball) -> Ball:
 
 
 class Bending(NamedTuple):
-    """Changes of n asperities: (n,) dd [length], (n,) d(log k) and (n, 2) dc [length]."""
+    """Changes of n asperities: (n,) dd [length], (n,) d(log k) and (n, 2) dc [length]; `ZERO` in
+    place of the first and the last if nothing but k changes."""
 
     offsets: Ball
     local: Ball
@@ -155,7 +156,7 @@ class Geometry:
     points: Ball  # (n, 2) r
     tips: Ball  # (n,) rho
     curvature: Ball  # (2,) 1/R along x and y
-    share: Ball  # (n, 2) c / r
+    share: Ball  # (n, 2) c / r, or the number 1
 
     @classmethod
     def of(cls, problem: NormalProblem, which: Indices) -> Geometry:
@@ -165,7 +166,7 @@ class Geometry:
         bent = np.isfinite(radii)
         inverse = 1.0 / Ball.exact(np.where(bent, radii, 1.0))
         curvature = where(bent, inverse, Ball.exact(np.zeros(2)))
-        share = Ball.exact(np.ones(r.shape))
+        share = Ball.exact(1.0)
         if problem.scene.geometry == "closest":
             share = 1.0 / (1.0 + rho[:, None] * curvature)
         return cls(problem, Ball.exact(r), rho, curvature, share)
@@ -188,15 +189,15 @@ class Geometry:
     def by_tip(self) -> Bending:
         r, local = self.points, -self.relative / (3.0 * self.tips * self.tips)
         if not self.closest:
-            return Bending(0.0 * local, local, 0.0 * r)
+            return Bending(ZERO, local, ZERO)
         outwards = r * self.share * self.share * self.curvature
         return Bending((r * r * self.bend * self.bend).sum() * 0.5, local, -outwards)
 
     @cached_property
     def by_radius(self) -> Bending:
         squared = self.curvature[0] * self.curvature[0]
-        flatter = self.points * self.share * self.share * squared
-        outwards = flatter * self.tips[:, None] if self.closest else 0.0 * flatter
+        flatter = self.points * (self.share * self.share * squared)
+        outwards = flatter * self.tips[:, None] if self.closest else ZERO
         local = -self.relative * squared / 3.0
         return Bending((self.points * flatter).sum() * 0.5, local, outwards)
 
