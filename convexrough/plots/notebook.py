@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import sys
 from base64 import b64encode
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from importlib import import_module
 from io import BytesIO
 from pathlib import Path
@@ -14,6 +15,7 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backend_bases import get_registered_canvas_class
 from matplotlib.figure import Figure as MatplotlibFigure
+from matplotlib.image import imsave
 
 from convexrough import checks
 from convexrough.contact import Contact
@@ -42,10 +44,9 @@ PICTURES = {
     "Provability": "surface.draw_provability",
 }
 
-#: Formats of files, with options for matplotlib: a level of compression that takes two thirds of
-#: the usual time, for files that are 5 % larger; and no dates, so that files can be compared.
+#: Formats of files, with options for matplotlib: no dates, so that files can be compared.
 FORMATS: dict[str, dict[str, Any]] = {
-    "png": {"pil_kwargs": {"compress_level": 3}},
+    "png": {},
     "svg": {"metadata": {"Date": None}},
     "pdf": {"metadata": {"CreationDate": None}},
 }
@@ -198,11 +199,27 @@ def save(
     if form not in FORMATS or (suffix in FORMATS and suffix != form):
         expected = f"one of {', '.join(FORMATS)}, that of the path if it has a suffix"
         raise InputError(what, found=repr(form), expected=expected)
-    dpi = checks.between("dpi", dpi, LEAST_DPI, MOST_DPI)
+    content = drawn(figure, form, checks.between("dpi", dpi, LEAST_DPI, MOST_DPI))()
+    Path(path).write_bytes(content)
+
+
+def drawn(figure: MatplotlibFigure, form: str, dpi: float) -> Callable[[], bytes]:
+    """Draw a figure. The result, which another thread may call, returns the content of a file."""
     canvas: Any = get_registered_canvas_class(form)(figure)
     before, figure.dpi = figure.dpi, dpi
     try:
         with rc_context(REAL_TEXT):  # `savefig` draws everything twice
-            getattr(canvas, f"print_{form}")(path, **FORMATS[form])
+            if form == "png":
+                canvas.draw()
+                return partial(_png, canvas.buffer_rgba(), dpi)
+            getattr(canvas, f"print_{form}")(file := BytesIO(), **FORMATS[form])
+            return file.getvalue
     finally:
         figure.dpi = before
+
+
+def _png(pixels: Any, dpi: float) -> bytes:
+    """The content of a file, compressed in two thirds of the usual time, and 5 % larger."""
+    options: Any = {"compress_level": 3}
+    imsave(file := BytesIO(), pixels, format="png", dpi=dpi, pil_kwargs=options)
+    return file.getvalue()

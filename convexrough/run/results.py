@@ -14,6 +14,7 @@ import os
 import platform
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from importlib import metadata
@@ -22,7 +23,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from convexrough import plots
 from convexrough.atomic import remove_unfinished, replacing, to_json, unfinished, write_text
 from convexrough.errors import FileError, ProofError, file_errors
 from convexrough.friction.shear import shear
@@ -116,14 +116,21 @@ class Writer:
             self.files.append(path)
 
     def figures(self, figures: Mapping[str, Figure]) -> None:
-        """Write each figure in each format."""
-        for stem, figure in figures.items():
-            for kind in self.formats:
-                path = self.path / f"{stem}.{kind}"
-                with replacing(path) as temporary:
-                    plots.save(figure, temporary, kind, self.dpi)
-                self.files.append(path)
-                figure.set_layout_engine("none")  # the layout is the same in all formats
+        """Write each figure in each format. While one is compressed, the next is drawn."""
+        from convexrough.plots.notebook import drawn  # imports matplotlib
+
+        def write(name: str, content: Callable[[], bytes]) -> None:
+            self.text(name, content())
+
+        with ThreadPoolExecutor(1) as pool:
+            writing: Future[Any] = pool.submit(bool)  # nothing yet
+            for stem, figure in figures.items():
+                for kind in self.formats:
+                    content = drawn(figure, kind, self.dpi)
+                    writing.result()
+                    writing = pool.submit(write, f"{stem}.{kind}", content)
+                    figure.set_layout_engine("none")  # the layout is the same in all formats
+            writing.result()
 
     def results(
         self, results: Sequence[Result], *, figures: bool, more: Mapping[str, Any] | None = None
@@ -135,9 +142,8 @@ class Writer:
         for result, each in zip(results, tables, strict=True):
             LOGGER.info(f"writing {result.name}")
             self.tables(each)
-        for result, some in zip(results, plotted, strict=False):
-            LOGGER.info(f"drawing {result.name}")
-            self.figures(some)
+        LOGGER.info("drawing")
+        self.figures({stem: figure for some in plotted for stem, figure in some.items()})
 
 
 @contextmanager
