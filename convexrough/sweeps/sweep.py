@@ -296,4 +296,29 @@ def dask(address: str) -> Iterator[Executor]:
         expected = 'a scheduler of Dask that answers, its file, or "local"'
         raise InputError("scheduler", found=f"{address} ({error})", expected=expected) from error
     with client:
-        yield client.get_executor(pure=False)
+        yield _OnDask(client)
+
+
+class _OnDask(Executor):
+    """An executor on the workers of a Dask client. If a worker dies while its result is fetched,
+    Dask's own `get_executor` fails or waits forever."""
+
+    def __init__(self, client: Any) -> None:
+        self._client = client
+
+    def submit(self, function: Callable[..., Any], /, *given: Any, **named: Any) -> Future[Any]:
+        future, remote = Future[Any](), self._client.submit(function, *given, **named, pure=False)
+
+        def fetch(_: object) -> None:
+            if future.set_running_or_notify_cancel():
+                try:
+                    future.set_result(remote.result())
+                except futures.CancelledError as error:  # the worker died, or the scheduler
+                    alive = self._client.status == "running"
+                    future.set_exception(BrokenExecutor(str(error)) if alive else error)
+                except Exception as error:
+                    future.set_exception(error)
+
+        remote.add_done_callback(fetch)
+        future.add_done_callback(lambda it: it.cancelled() and remote.cancel())
+        return future
