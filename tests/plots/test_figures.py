@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from figure_checks import discs, fits, texts
 from friction_scenes import LARGEST, ONE, PAPER, follow
-from matplotlib import style
+from matplotlib import rc_context, style
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from numpy.testing import assert_allclose
@@ -289,11 +289,11 @@ def test_the_curve_of_the_smooth_sphere_uses_the_area_of_a_cell() -> None:
 def test_files_keep_their_text_and_pixels(tmp_path: Path) -> None:
     figure = Figure(figsize=(1, 1))
     figure.subplots().set_xlabel("load [mN]")
-    for form in ("svg", "pdf", "png"):
-        plots.save(figure, tmp_path / f"a.{form}", dpi=600)
-    svg, pdf, png = ((tmp_path / f"a.{form}").read_bytes() for form in ("svg", "pdf", "png"))
+    names = ("a.svg", "a.pdf", "a.png", "b.svg", "b.png")
+    for name, origin in zip(names, ["upper"] * 4 + ["lower"], strict=True):
+        with rc_context({"image.origin": origin}):
+            plots.save(figure, tmp_path / name, name[2:], 600)
+    svg, pdf, png, *again = ((tmp_path / name).read_bytes() for name in names)
+    assert again == [svg, png]  # no date inside; not upside down
     assert re.search(rb"<text[^>]*>load \[mN\]</text>", svg)
-    assert pdf.startswith(b"%PDF")
-    assert png[16:24] == 2 * (600).to_bytes(4, "big")  # the width and the height
-    plots.save(figure, tmp_path / "a.svg", "svg")
-    assert (tmp_path / "a.svg").read_bytes() == svg  # no date inside
+    assert (pdf[:4], png[16:24]) == (b"%PDF", 2 * (600).to_bytes(4, "big"))  # width and height
