@@ -140,8 +140,8 @@ def product(level: Level, weights: Ball) -> Ball:
 
 
 class Bending(NamedTuple):
-    """Changes of n asperities: (n,) dd [length], (n,) d(log k) and (n, 2) dc [length]; `ZERO` in
-    place of the first and the last if nothing but k changes."""
+    """Changes of n asperities: (n,) dd [length], (n,) d(log k) and (n, 2) dc [length]; the number 0
+    may stand for an array of zeros."""
 
     offsets: Ball
     local: Ball
