@@ -142,8 +142,9 @@ class Writer:
         for result, each in zip(results, tables, strict=True):
             LOGGER.info(f"writing {result.name}")
             self.tables(each)
-        LOGGER.info("drawing")
-        self.figures({stem: figure for some in plotted for stem, figure in some.items()})
+        if figures:
+            LOGGER.info("drawing")
+            self.figures({stem: figure for some in plotted for stem, figure in some.items()})
 
 
 @contextmanager
