@@ -38,8 +38,9 @@ SINGLE_LIMIT, DOUBLE_LIMIT = 2e-6, 1e-13
 #: below ENERGY times SINGLE_LIMIT or DOUBLE_LIMIT times its first value.
 ENERGY = 1e-2
 
-#: A step is made in two parts if TWICE times its tolerance is at most SINGLE_LIMIT.
-TWICE = 30.0
+#: A step is made in two parts if TWICE times its tolerance is at most SINGLE_LIMIT. Corrections of
+#: loads ask for a tenth of the rounding error (`normal.refine.ENOUGH`), so ten times that is enough.
+TWICE = 10.0
 
 MOST_ITERATIONS = 500
 
