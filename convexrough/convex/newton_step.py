@@ -39,7 +39,7 @@ SINGLE_LIMIT, DOUBLE_LIMIT = 2e-6, 1e-13
 ENERGY = 1e-2
 
 #: A step is made in two parts if TWICE times its tolerance is at most SINGLE_LIMIT. Corrections of
-#: loads ask for a tenth of the rounding error (`normal.refine.ENOUGH`), so ten times that is enough.
+#: loads aim at a tenth of the rounding error (`normal.refine.ENOUGH`), so ten times this suffices.
 TWICE = 10.0
 
 MOST_ITERATIONS = 500
