@@ -34,8 +34,9 @@ ENTRY_ROUNDOFFS = 8
 #: entries; for larger matrices a cache saves no time.
 KEPT = 2**16
 
-#: Number of entries of a matrix that are computed at once; they fit in a processor's cache.
-ENTRIES = 2**15
+#: Number of entries of a matrix that are computed at once. They fit in a processor's cache, and in
+#: memory that need not be mapped for each block.
+ENTRIES = 2**14
 
 #: Ways to compute the operator: a matrix, transforms on a lattice, transforms on a mesh.
 Kind = Literal["dense", "lattice", "scattered"]
@@ -218,26 +219,38 @@ class DirectCoupling(Coupling):
         return self._sums(strengths, power) * (1.0 + 1.01 * loss)
 
     def _sums(self, values: Array, power: int) -> Array:
-        blocks = (each if power == 1 else each**power for each in self._blocks())
-        return np.concatenate([each @ values for each in blocks])
+        sums = np.empty(len(self.targets))
+
+        def add_up(rows: slice, inverse: Array) -> None:
+            sums[rows] = (inverse if power == 1 else inverse**power) @ values
+
+        self._in_blocks(add_up)
+        return sums
 
     @cached_property
     def _whole(self) -> Array:
         return inverse_distances(self.targets, self.points)
 
-    def _blocks(self) -> Iterator[Array]:
-        """Blocks of rows of the matrix 1 / r; a small matrix is one block."""
-        if len(self.points) * len(self.targets) <= KEPT:
-            yield self._whole
-        else:
-            for rows in _rows(len(self.targets), len(self.points)):
-                yield inverse_distances(self.targets[rows], self.points)
+    def _in_blocks(self, work: Callable[[slice, Array], object]) -> None:
+        """Call work(rows, inverse) for blocks of rows of the matrix 1 / r, perhaps in several
+        threads; a small matrix is one block."""
+        if (pairs := len(self.points) * len(self.targets)) <= KEPT:
+            work(slice(None), self._whole)
+            return
+
+        def compute(rows: slice) -> None:
+            work(rows, inverse_distances(self.targets[rows], self.points))
+
+        blocks = _rows(len(self.targets), len(self.points))
+        threads.each(compute, blocks, threads.worthwhile(pairs))
 
     @cached_property
     def _entry_error(self) -> float:
         if self.point_error == 0:
             return entry_error(0.0, np.inf)
-        closest = max(float(inverse.max(initial=0.0)) for inverse in self._blocks())
+        found = [0.0]
+        self._in_blocks(lambda _, inverse: found.append(float(inverse.max(initial=0.0))))
+        closest = max(found)
         return entry_error(self.point_error, 1.0 / closest if closest > 0 else np.inf)
 
 

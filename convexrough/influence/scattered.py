@@ -37,9 +37,9 @@ FEW = 1500
 #: has at least this part of the asperities. Affects speed only.
 SHARED = 0.25
 
-#: Largest number of pairs (asperity, other point) that `onto` computes one by one. Affects speed
-#: only.
-FEW_PAIRS = 10**8
+#: If there are at most this many asperities or other points, `onto` computes pair by pair. Affects
+#: speed only.
+FEW_ONTO = 2500
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +100,7 @@ class ScatteredInfluence(coupling.Influence):
         return replace(self, points=self.points[which], tails=tails, whole=whole)
 
     def onto(self, points: Array) -> coupling.Coupling:
-        if len(points) * len(self) <= FEW_PAIRS:
+        if min(len(points), len(self)) <= FEW_ONTO:
             return super().onto(points)
         together = np.concatenate((points, self.points))
         joint = replace(self, points=together, tails=None, whole=None)

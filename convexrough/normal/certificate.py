@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any, ClassVar
 
@@ -33,8 +33,8 @@ from convexrough.sphere import hertz
 STATUSES = np.array(["undecided", "contact", "open"])
 TOUCHING, OPEN = 1, 2
 
-#: For at most this many asperities that can touch, a contact keeps the operator for friction, and a
-#: certificate for the gaps.
+#: For at most this many asperities that can touch, a contact keeps the operator for friction. So
+#: does a certificate for the gaps, which also keeps what a larger matrix is made from.
 MOST_KEPT = {"dense": ALL_SHARP, "lattice": 2**21, "scattered": 2**16}
 
 #: If no contact radius of a solution exceeds this fraction of the distance to the nearest
@@ -288,9 +288,14 @@ class Depths:
     error: Array  # error bounds of these; infinite if nothing is proved
 
     def kept(self) -> Callable[[], tuple[Array, ...]]:
-        """These depths or, if the operator is large, a function that has them."""
-        few = len(self.problem) <= MOST_KEPT[self.problem.influence.name]
-        return self if few else partial(tuple, self())
+        """These depths, but without a large matrix; or, if the operator is large otherwise, a
+        function that has them."""
+        problem, kind = self.problem, self.problem.influence.name
+        if len(problem) <= MOST_KEPT[kind]:
+            return self
+        if kind == "dense":
+            return replace(self, problem=problem.unstored())
+        return partial(tuple, self())
 
     def __call__(self) -> tuple[Array, ...]:
         """(N,) [length] indentations of all asperities of the scene, and their error bounds."""

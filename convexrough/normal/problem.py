@@ -47,6 +47,10 @@ ALL_SHARP = 700
 #: stored, A P is always updated in this way.
 NEARBY = 1e-13
 
+#: Number of pairs of asperities that can touch and others up to which displacements of the others
+#: are computed pair by pair. Affects speed only.
+FEW_PAIRS = 2**17
+
 #: Factor by which one correction by conjugate gradients reduces the residual.
 REDUCTION = 1e-7
 
@@ -149,7 +153,17 @@ class NormalProblem:
     @cached_property
     def onto_screened(self) -> Coupling:
         """The map from loads to displacements of the asperities `screened`."""
-        return self.influence.onto(self.scene.contact_points[self.screened])
+        pairs = len(self) * len(self.screened)
+        influence = self.influence if pairs <= FEW_PAIRS else self.unstored().influence
+        return influence.onto(self.scene.contact_points[self.screened])
+
+    def unstored(self) -> NormalProblem:
+        """The same problem, with an operator that is not a matrix."""
+        A = self.influence
+        if not A.stored:
+            return self
+        kind: Kind = "scattered" if self.scene.lattice is None else "lattice"
+        return replace(self, influence=couple(self.scene, self.candidates, A.scale, kind))
 
     @cached_property
     def places(self) -> Indices:

@@ -124,7 +124,7 @@ def test_parts_and_other_points(
         monkeypatch.setattr(coupling, "ENTRIES", 16)
         couplings += [(part.onto(points), points) for points in targets]
     if kind == "scattered":
-        monkeypatch.setattr(scattered, "FEW_PAIRS", 0)
+        monkeypatch.setattr(scattered, "FEW_ONTO", 0)
         couplings += [(part.onto(points), points) for points in targets if len(points) and count]
         together = ScatteredInfluence(np.concatenate((mixed, part.points)), SCALE)
         couplings.append((JointCoupling(together, len(mixed)), mixed))
