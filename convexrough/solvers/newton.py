@@ -45,8 +45,9 @@ NOISY = 1e-6
 
 #: Asperities are near the contact if their gap at the start is at most MARGIN times the largest D_i
 #: plus the standard deviation of heights about their means over RINGS rings about the axis, of a
-#: SAMPLE if there are more. Affects speed only.
-MARGIN, RINGS, SAMPLE = 0.01, 32, 50_000
+#: SAMPLE if there are more. UNEVEN replaces MARGIN for bodies that are not spheres, which have a
+#: poor start. Affects speed only.
+MARGIN, UNEVEN, RINGS, SAMPLE = 0.01, 0.3, 32, 50_000
 
 
 @dataclass(frozen=True)
@@ -145,7 +146,8 @@ class Newton:
         refines = problem.influence.cheap_sums and not self.tolerance > 0
         if len(problem) > ALL_ITERATED and start is None:
             highest = float(np.maximum(problem.approach_bound + problem.offsets, 0.0).max())
-            margin = MARGIN * highest + _roughness(problem) / problem.units.length
+            part = UNEVEN if isinstance(problem.scene.sphere_radius, tuple) else MARGIN
+            margin = part * highest + _roughness(problem) / problem.units.length
             near = np.flatnonzero(indentation > -margin)
         while True:
             begin = indentation[near]
