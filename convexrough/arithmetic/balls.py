@@ -215,6 +215,11 @@ def of_rows(function: Callable[..., Any], *values: Any) -> Any:
     return function(*values)
 
 
+def added(*balls: Ball) -> Ball:
+    """The sum of balls, computed faster than by `+`."""
+    return elementwise(_sum, *balls)
+
+
 def joined(balls: Sequence[Ball]) -> Ball:
     """The balls concatenated along the first axis."""
     joint: Ball = of_rows(lambda *each: np.concatenate(each), *balls)
@@ -262,9 +267,11 @@ def _finished(mid: Pair, radius: Array) -> tuple[Pair, Array]:
     return Pair(high, low), np.where(bad | np.isnan(radius), np.inf, radius)
 
 
-def _sum(x: Pair, dx: Array, y: Pair, dy: Array) -> tuple[Pair, Array]:
-    total = x + y
-    return total, (dx + dy + _lost(total)) * UP
+def _sum(x: Pair, dx: Array, *others: Any) -> tuple[Pair, Array]:
+    for y, dy in zip(others[::2], others[1::2], strict=True):
+        x = x + y
+        dx = (dx + dy + _lost(x)) * UP
+    return x, dx
 
 
 def _product(x: Pair, dx: Array, y: Pair, dy: Array) -> tuple[Pair, Array]:

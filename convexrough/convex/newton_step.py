@@ -38,8 +38,8 @@ SINGLE_LIMIT, DOUBLE_LIMIT = 2e-6, 1e-13
 #: below ENERGY times SINGLE_LIMIT or DOUBLE_LIMIT times its first value.
 ENERGY = 1e-2
 
-#: A step is made in two parts if TWICE times its tolerance is at most SINGLE_LIMIT. Corrections of
-#: loads aim at a tenth of the rounding error (`normal.refine.ENOUGH`), so ten times this suffices.
+#: A step gets a second part if it leaves more than TWICE times its tolerance. Corrections of loads
+#: aim at a tenth of the rounding error (`normal.refine.ENOUGH`), so ten times this suffices.
 TWICE = 10.0
 
 MOST_ITERATIONS = 500
@@ -125,8 +125,8 @@ def _in_two_parts(system: _System, defect: Array, tolerance: float) -> Array | N
     """The step by `_iterate`; in two parts only where single precision is not enough."""
     influence, shells, root, balanced = system
     smooth = influence.smoother(root)
-    step = _iterate(system, smooth, defect, tolerance)
-    if step is None or shells is not None or influence.stored or TWICE * tolerance > SINGLE_LIMIT:
+    step, reached = _iterate(system, smooth, defect, tolerance)
+    if step is None or shells is not None or influence.stored or reached <= TWICE * tolerance:
         return step
     slopes = root**2
     left, missing = defect + step + influence.apply(slopes * step), 0.0
@@ -137,15 +137,15 @@ def _in_two_parts(system: _System, defect: Array, tolerance: float) -> Array | N
     if size == 0.0 or not left.any():
         return step
     share = float(np.linalg.norm(left)) / size
-    rest = _iterate(system, smooth, left, tolerance / share, missing)
+    rest, _ = _iterate(system, smooth, left, tolerance / share, missing)
     return None if rest is None else step + rest
 
 
 def _iterate(
     system: _System, smooth: Smoother | None, defect: Array, tolerance: float, total: float = 0.0
-) -> Array | None:
-    """The step by preconditioned conjugate gradients (docs/theory/newton.md, "Many asperities");
-    None if the matrix is not positive definite.
+) -> tuple[Array | None, float]:
+    """The step by preconditioned conjugate gradients (docs/theory/newton.md, "Many asperities"),
+    and the part of F that it leaves; None for the step if the matrix is not positive definite.
 
     The step is beta - F - A W y where an asperity is open, and (I + W diag(`shells`) W) y / W where
     one touches. Without shells F + F' d is then beta, minus r / W where asperities touch, with the
@@ -161,7 +161,8 @@ def _iterate(
     dtype: Any = np.float32 if single else np.float64
     limit = SINGLE_LIMIT if single else DOUBLE_LIMIT
     size = float(np.abs(defect).max()) or 1.0
-    enough = max(tolerance, limit) * float(np.linalg.norm(defect)) / size
+    norm = float(np.linalg.norm(defect)) / size
+    enough = max(tolerance, limit) * norm
     w: Values = root.astype(dtype)
     diagonal = dtype(1) if shells is None else (1.0 + root * shells * root).astype(dtype)
     border = smooth(w) if smooth and balanced else w
@@ -197,7 +198,7 @@ def _iterate(
         bent += diagonal * p
         curvature = float(p @ bent)
         if curvature <= 0:
-            return None
+            return None, np.inf
         length = dtype(squared / curvature)
         y += length * p
         q *= length
@@ -209,4 +210,4 @@ def _iterate(
         p *= dtype(squared / before)
         p += z
     step = np.where(inverse > 0, diagonal * y * inverse, beta - product - defect / size)
-    return np.asarray(size * step)
+    return np.asarray(size * step), left / (norm or 1.0)

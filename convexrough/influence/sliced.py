@@ -157,10 +157,11 @@ class Sliced:
         if top == 0.0:
             return Ball.exact(loads)
         size = 2.0 ** np.ceil(np.log2(top))
-        shares = Pair(np.asarray(loads.high / size), np.asarray(loads.low / size))  # exact
+        loaded = loads.high.nonzero()[0]
+        shares = Pair(*(part / size for part in loads.at(loaded)))  # exact
         slices, bits = self._cut(shares)
         sizes = [float(np.linalg.norm(each)) for each in slices]
-        fields = (self.box.laid_out(slices.pop(0), at) for _ in range(count))
+        fields = (self.box.laid_out(slices.pop(0), at[loaded]) for _ in range(count))
         levels = through_waves(fields, self.box.padded, self.box.workers, self._levels)
         unit = size / self.unit
         units = [2.0 ** -(self.bits + bits + level * self.more) for level in range(count)]

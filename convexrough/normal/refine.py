@@ -15,7 +15,7 @@ from typing import Any, TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.arithmetic.balls import TINY, Ball, of_rows, quietly, residual
+from convexrough.arithmetic.balls import TINY, Ball, added, of_rows, quietly, residual
 from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair, in_parts, two_sum
 from convexrough.arrays import Array, frozen, largest, summed
 from convexrough.convex.theorem import excess
@@ -80,7 +80,7 @@ class Trial:
     @property
     def indentation(self) -> Ball:
         """(n,) indentations D0 + d - A P under these loads; a negative one is minus the gap."""
-        return self.problem.exact.offsets + self.approach - self.product
+        return added(self.problem.exact.offsets, self.approach, -self.product)
 
     def improved(self, other: Trial, where: NDArray[np.bool_]) -> Trial:
         """This trial of a stack, with the rows chosen by `where` replaced by those of `other`."""
