@@ -15,7 +15,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from convexrough import checks
-from convexrough.arithmetic.balls import Ball, of_rows
+from convexrough.arithmetic.balls import Ball, added, of_rows
 from convexrough.arrays import Array, among_zeros, frozen
 from convexrough.contact import Contact, levels_of
 from convexrough.errors import InputError
@@ -88,13 +88,13 @@ class Number:
     @cached_property
     def offsets(self) -> Ball:
         """(n,) derivatives by the offsets d."""
-        scaled = sum((part.slopes.offsets for part in self.parts), start=self._zero)
+        scaled = added(self._zero, *(part.slopes.offsets for part in self.parts))
         return scaled / self.top.problem.units.length
 
     @cached_property
     def local(self) -> Ball:
         """(n,) derivatives by log k."""
-        return sum((part.slopes.local for part in self.parts), start=self._zero)
+        return added(self._zero, *(part.slopes.local for part in self.parts))
 
     @property
     def _zero(self) -> Ball:

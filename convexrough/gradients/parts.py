@@ -20,13 +20,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
 from functools import cached_property
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from convexrough import threads
-from convexrough.arithmetic.balls import Ball, joined, of_rows, where
+from convexrough.arithmetic.balls import Ball, added, joined, of_rows, where
 from convexrough.arrays import Indices
 from convexrough.errors import InputError
 from convexrough.normal.level import Level
@@ -96,7 +97,7 @@ class Part:
     def coupled(self) -> Ball:
         """(n,) A P."""
         level = self.level
-        return level.approach + level.problem.exact.offsets - level.indentation
+        return added(level.problem.exact.offsets, level.approach, -level.indentation)
 
     @cached_property
     def slopes(self) -> Slopes:
@@ -128,8 +129,8 @@ class Part:
             moved = moved - weight * level.tangent.loads
             by_load = by_load + weight * level.tangent.approach
         lifted = moved if v is None else moved + v
-        local = (own * 3.0 / 5.0 - moved) * level.indentation.positive_part()
-        return Slopes(lifted - own, local, own * 0.5 - lifted, by_load)
+        local = (own * Fraction(3, 5) - moved) * level.indentation.positive_part()
+        return Slopes(lifted - own, local, own.scaled(0.5) - lifted, by_load)
 
 
 def product(level: Level, weights: Ball) -> Ball:

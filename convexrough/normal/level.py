@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.arithmetic.balls import Ball, of_rows, stacked, where
+from convexrough.arithmetic.balls import Ball, added, of_rows, stacked, where
 from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices, among_zeros, summed
 from convexrough.convex.newton_step import correct
@@ -29,7 +29,7 @@ from convexrough.convex.theorem import distance, excess
 from convexrough.errors import ProofError, SolverError
 from convexrough.normal.boxes import Box
 from convexrough.normal.problem import REDUCTION, NormalProblem
-from convexrough.normal.refine import CORRECTIONS, ENOUGH, Trial
+from convexrough.normal.refine import CORRECTIONS, ENOUGH, Trial, mean
 from convexrough.roundoff import SAFETY
 
 #: Largest accepted residual of `Level.response` after refinement, divided by the larger of the
@@ -224,9 +224,8 @@ class Level:
 
         def residual(x: Pair, product: Ball) -> tuple[Ball, Ball]:
             """x / c + A x - right - beta, and beta, which makes the mean weighted by c about 0."""
-            above = springs.compliance * x + product - right
-            mean = float(weights @ above.value)
-            beta = Ball.exact(mean) + float(weights @ (above - mean).value)
+            above = added(springs.compliance * x, product, -right)
+            beta = mean(c, above)
             return above - beta, beta
 
         sprung = c > 0
@@ -350,7 +349,7 @@ def energies(levels: Sequence[Level]) -> Ball:
         )
         data = loaded[0].problem.exact
         local = data.coefficients * Ball.exact(trial).two_thirds()
-        per_load = local * Fraction(3, 5) + product * 0.5 - data.offsets
+        per_load = added(local * Fraction(3, 5), product.scaled(0.5), -data.offsets)
         found = Ball.exact(trial).dot(per_load)
         # The energy of trial loads P exceeds the least energy at their total by at most the sum of
         # e_i |P_i - P*_i|, for the solution P* and e = `excess`.

@@ -99,12 +99,16 @@ def trial(problem: NormalProblem, loads: Pair, missing: Ball, product: Ball) -> 
         gap = residual(data.coefficients, exact, product, data.offsets, problem.control)
         return Trial(problem, loads, product, gap, problem.control, missing)
     above = residual(data.coefficients, exact, product, data.offsets, Ball.exact(0.0))
-    weights = np.sqrt(loads.high)
-    total = summed(weights)
-    shift = summed(weights * above.value) / total
-    rest = summed(weights * ((above.value - shift) + above.mid.low)) / total
-    approach = Ball.exact(Pair(*(np.asarray(part) for part in two_sum(shift, rest))))
+    approach = mean(np.sqrt(loads.high), above)
     return Trial(problem, loads, product, above - approach, approach, missing)
+
+
+def mean(weights: Array, values: Ball) -> Ball:
+    """About the weighted mean of the midpoints, as an exact number: (), or (m, 1) for a stack."""
+    high, total = values.value, summed(weights)
+    first = summed(weights * high) / total
+    rest = summed(weights * ((high - first) + values.mid.low)) / total
+    return Ball.exact(Pair(*map(np.asarray, two_sum(first, rest))))
 
 
 def refined(problem: NormalProblem, best: Trial) -> Trial:
