@@ -155,7 +155,7 @@ class Geometry:
 
     problem: NormalProblem
     points: Ball  # (n, 2) r
-    tips: Ball  # (n,) rho
+    tips: Ball  # (n,) rho, or (1,) in "summit" if all are equal
     curvature: Ball  # (2,) 1/R along x and y
     share: Ball  # (n, 2) c / r, or the number 1
 
@@ -163,14 +163,14 @@ class Geometry:
     def of(cls, problem: NormalProblem, which: Indices) -> Geometry:
         """The geometry of the asperities `which` of the scene."""
         asperities, radii = problem.scene.asperities, np.array(along(problem.scene.sphere_radius))
-        r, rho = asperities.positions[which], Ball.exact(asperities.tip_radii[which])
+        r, rho = asperities.positions[which], asperities.tip_radii[which]
         bent = np.isfinite(radii)
         inverse = 1.0 / Ball.exact(np.where(bent, radii, 1.0))
         curvature = where(bent, inverse, Ball.exact(np.zeros(2)))
-        share = Ball.exact(1.0)
-        if problem.scene.geometry == "closest":
-            share = 1.0 / (1.0 + rho[:, None] * curvature)
-        return cls(problem, Ball.exact(r), rho, curvature, share)
+        closest = problem.scene.geometry == "closest"
+        tips = Ball.exact(rho[:1] if not closest and (rho == rho[:1]).all() else rho)
+        share = 1.0 / (1.0 + tips[:, None] * curvature) if closest else Ball.exact(1.0)
+        return cls(problem, Ball.exact(r), tips, curvature, share)
 
     @property
     def closest(self) -> bool:
@@ -197,10 +197,11 @@ class Geometry:
     @cached_property
     def by_radius(self) -> Bending:
         squared = self.curvature[0] * self.curvature[0]
-        flatter = self.points * (self.share * self.share * squared)
-        outwards = flatter * self.tips[:, None] if self.closest else ZERO
         local = -self.relative * squared / 3.0
-        return Bending((self.points * flatter).sum() * 0.5, local, outwards)
+        if not self.closest:
+            return Bending((self.points * self.points).sum() * (squared * 0.5), local, ZERO)
+        flatter = self.points * (self.share * self.share * squared)
+        return Bending((self.points * flatter).sum() * 0.5, local, flatter * self.tips[:, None])
 
     def bent(self, heights: Ball, tips: Ball, moved: Ball, radius: Ball) -> Bending:
         """Changes due to those of z and rho (n,), of r (n, 2), and of the radius of a sphere."""

@@ -343,17 +343,23 @@ def energies(levels: Sequence[Level]) -> Ball:
     which = [k for k, level in enumerate(levels) if level.trial is not None]
     if which:
         loaded = [levels[k] for k in which]
-        names, states = ("loads", "gap", "product", "missing"), [it.trial for it in loaded]
-        trial, gap, product, missing = (
-            stacked([getattr(state, name) for state in states]) for name in names
+        states = [level.trial for level in loaded if level.trial is not None]
+        carrying = np.any(
+            [level.loads.size > 0 for level in loaded] + [it.inside for it in states], 0
         )
-        data = loaded[0].problem.exact
+        at = partial(np.take, indices=carrying.nonzero()[0], axis=-1)
+        trial, gap, product = (
+            stacked([of_rows(at, getattr(state, name)) for state in states])
+            for name in ("loads", "gap", "product")
+        )
+        missing = stacked([state.missing for state in states])
+        data = loaded[0].problem.exact.at(carrying)
         local = data.coefficients * Ball.exact(trial).two_thirds()
         per_load = added(local * Fraction(3, 5), product.scaled(0.5), -data.offsets)
         found = Ball.exact(trial).dot(per_load)
         # The energy of trial loads P exceeds the least energy at their total by at most the sum of
         # e_i |P_i - P*_i|, for the solution P* and e = `excess`.
-        off = (Ball.exact(trial) - stacked([level.loads for level in loaded])).size
+        off = (Ball.exact(trial) - stacked([of_rows(at, level.loads) for level in loaded])).size
         above = (excess(gap, trial.high > 0) * off).sum(axis=-1) * (1 + SAFETY)
         uncertainty = np.array([float(level.load.radius) for level in loaded])
         rate = np.array([float(level.approach.size) for level in loaded])

@@ -52,7 +52,7 @@ NEARBY = 1e-13
 FEW_PAIRS = 2**17
 
 #: Factor by which one correction by conjugate gradients reduces the residual.
-REDUCTION = 1e-7
+REDUCTION = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
