@@ -204,6 +204,13 @@ def where(condition: NDArray[np.bool_], yes: Ball, no: Ball) -> Ball:
     return chosen
 
 
+def replaced(balls: Ball, which: Any, others: Ball) -> Ball:
+    """The balls, with those at the index `which` replaced, in the same memory."""
+    for each, new in zip((*balls.mid, balls.radius), (*others.mid, others.radius), strict=True):
+        each[which] = new
+    return balls
+
+
 def of_rows(function: Callable[..., Any], *values: Any) -> Any:
     """The result of `function` on arrays, or on each of the arrays of pairs and balls."""
     first = values[0]

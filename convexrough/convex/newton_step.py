@@ -39,8 +39,8 @@ SINGLE_LIMIT, DOUBLE_LIMIT = 2e-6, 1e-13
 ENERGY = 1e-2
 
 #: A step gets a second part if it leaves more than TWICE times its tolerance. Corrections of loads
-#: aim at a tenth of the rounding error (`normal.refine.ENOUGH`), so ten times this suffices.
-TWICE = 10.0
+#: aim at a tenth of the rounding error (`normal.refine.ENOUGH`), so nearly ten times this suffices.
+TWICE = 8.0
 
 MOST_ITERATIONS = 500
 

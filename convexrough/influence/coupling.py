@@ -38,6 +38,9 @@ KEPT = 2**16
 #: memory that need not be mapped for each block.
 ENTRIES = 2**14
 
+#: The same number where several threads share the work, which wait for each other less often then.
+SHARED = 2**16
+
 #: Ways to compute the operator: a matrix, transforms on a lattice, transforms on a mesh.
 Kind = Literal["dense", "lattice", "scattered"]
 
@@ -219,10 +222,10 @@ class DirectCoupling(Coupling):
         return self._sums(strengths, power) * (1.0 + 1.01 * loss)
 
     def _sums(self, values: Array, power: int) -> Array:
-        sums = np.empty(len(self.targets))
+        sums = np.zeros(len(self.targets))
 
-        def add_up(rows: slice, inverse: Array) -> None:
-            sums[rows] = (inverse if power == 1 else inverse**power) @ values
+        def add_up(rows: slice, columns: slice, inverse: Array) -> None:
+            sums[rows] += (inverse if power == 1 else inverse**power) @ values[columns]
 
         self._in_blocks(add_up)
         return sums
@@ -231,17 +234,18 @@ class DirectCoupling(Coupling):
     def _whole(self) -> Array:
         return inverse_distances(self.targets, self.points)
 
-    def _in_blocks(self, work: Callable[[slice, Array], object]) -> None:
-        """Call work(rows, inverse) for blocks of rows of the matrix 1 / r, perhaps in several
-        threads; a small matrix is one block."""
+    def _in_blocks(self, work: Callable[[slice, slice, Array], object]) -> None:
+        """Call work(rows, columns, inverse) for blocks of the matrix 1 / r, those of different rows
+        perhaps in several threads; a small matrix is one block."""
         if (pairs := len(self.points) * len(self.targets)) <= KEPT:
-            work(slice(None), self._whole)
+            work(slice(None), slice(None), self._whole)
             return
 
         def compute(rows: slice) -> None:
-            work(rows, inverse_distances(self.targets[rows], self.points))
+            for columns in threads.chunks(len(self.points), SHARED):
+                work(rows, columns, inverse_distances(self.targets[rows], self.points[columns]))
 
-        blocks = _rows(len(self.targets), len(self.points))
+        blocks = threads.chunks(len(self.targets), max(1, SHARED // len(self.points)))
         threads.each(compute, blocks, threads.worthwhile(pairs))
 
     @cached_property
@@ -249,7 +253,7 @@ class DirectCoupling(Coupling):
         if self.point_error == 0:
             return entry_error(0.0, np.inf)
         found = [0.0]
-        self._in_blocks(lambda _, inverse: found.append(float(inverse.max(initial=0.0))))
+        self._in_blocks(lambda *block: found.append(float(block[-1].max(initial=0.0))))
         closest = max(found)
         return entry_error(self.point_error, 1.0 / closest if closest > 0 else np.inf)
 

@@ -238,7 +238,7 @@ class Level:
         product = problem.moved(nothing, Ball.exact(nothing), x)
         left, beta = residual(x, product)
         size, rounding = weighted(left.value), weighted(left.radius)
-        accepted = SOLVED * max(size, weighted(right.value))
+        accepted = SOLVED * max(size, weighted(np.abs(right.value) + abs(float(beta.value))))
         for _ in range(CORRECTIONS):
             if not sharp and (rounding > ROUGH * size or not halved):
                 product, sharp, halved = problem.product(x), True, True

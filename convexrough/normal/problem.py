@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from convexrough import checks, threads
-from convexrough.arithmetic.balls import Ball
+from convexrough.arithmetic.balls import Ball, replaced
 from convexrough.arithmetic.pairs import Pair
 from convexrough.arrays import Array, Indices, among_zeros, evenly, frozen, largest, taken
 from convexrough.convex.newton_step import correct
@@ -211,10 +211,7 @@ class NormalProblem:
         assert isinstance(self.influence, DenseInfluence)
         found, some, every = self.plain_product(loads), loads.high.nonzero()[0], self.influence.sums
         matrix = MatrixSums(every.points.at(some), every.point_error)
-        exact = matrix(loads.at(some)) * self.exact.scale
-        for whole, part in zip((*found.mid, found.radius), (*exact.mid, exact.radius), strict=True):
-            whole[some] = part
-        return found
+        return replaced(found, some, matrix(loads.at(some)) * self.exact.scale)
 
     def correct(self, slopes: Array, defect: Array, enough: Any = 0.0, todo: Any = True) -> Array:
         """(n,) one Newton step for the equation F(delta) = 0 of docs/theory/newton.md.

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from convexrough.arithmetic.balls import Ball, of_rows, where
+from convexrough.arithmetic.balls import Ball, of_rows, replaced, where
 from convexrough.arrays import Array, summed
 from convexrough.convex.theorem import distance
 from convexrough.normal.boxes import Box, box_of_touching, crowded, tried
@@ -130,9 +130,7 @@ def _or_by_law(P: Ball, n: Ball, k: Ball) -> Ball:
     ratio, given = n[which] / k[which], P[which]
     by_law = ratio.positive_part() * ratio.sqrt()
     best = where(by_law.radius < given.radius, by_law, given)
-    found: Ball = of_rows(np.copy, P)
-    found.mid.high[which], found.mid.low[which], found.radius[which] = *best.mid, best.radius
-    return found
+    return replaced(of_rows(np.copy, P), which, best)
 
 
 def _approach_error(

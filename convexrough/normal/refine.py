@@ -15,9 +15,17 @@ from typing import Any, TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
-from convexrough.arithmetic.balls import TINY, Ball, added, of_rows, quietly, residual
+from convexrough.arithmetic.balls import (
+    TINY,
+    Ball,
+    added,
+    of_rows,
+    quietly,
+    replaced,
+    residual,
+)
 from convexrough.arithmetic.pairs import PAIR_ROUNDOFF, Pair, in_parts, two_sum
-from convexrough.arrays import Array, frozen, largest, summed
+from convexrough.arrays import Array, Indices, among_zeros, frozen, largest, summed
 from convexrough.convex.theorem import excess
 from convexrough.errors import SolverError
 from convexrough.normal.problem import NormalProblem
@@ -81,6 +89,16 @@ class Trial:
     def indentation(self) -> Ball:
         """(n,) indentations D0 + d - A P under these loads; a negative one is minus the gap."""
         return added(self.problem.exact.offsets, self.approach, -self.product)
+
+    def among(self, problem: NormalProblem, which: Indices) -> Trial:
+        """The trial of the asperities of `problem`, if `which` are those of this trial; the others
+        have no loads, and products in float64."""
+        spread = partial(among_zeros, places=which, count=len(problem))
+        loads = of_rows(spread, self.loads)
+        product = problem.plain_product(loads)
+        gap = added(product, -problem.exact.offsets, -self.approach)
+        product, gap = replaced(product, which, self.product), replaced(gap, which, self.gap)
+        return Trial(problem, loads, product, gap, self.approach, self.missing)
 
     def improved(self, other: Trial, where: NDArray[np.bool_]) -> Trial:
         """This trial of a stack, with the rows chosen by `where` replaced by those of `other`."""

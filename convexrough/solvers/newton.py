@@ -22,7 +22,7 @@ from convexrough.convex.newton_step import correct
 from convexrough.errors import SolverError
 from convexrough.normal.law import Pressed, on_hertz_pressure
 from convexrough.normal.problem import NormalProblem
-from convexrough.normal.refine import refined, trial_of
+from convexrough.normal.refine import Trial, refined, refined_loads, trial_of
 from convexrough.roundoff import SAFETY
 from convexrough.solvers.mean_field import mean_field_indentation
 from convexrough.solvers.solution import Solution
@@ -48,6 +48,10 @@ NOISY = 1e-6
 #: SAMPLE if there are more. UNEVEN replaces MARGIN for bodies that are not spheres, which have a
 #: poor start. Affects speed only.
 MARGIN, UNEVEN, RINGS, SAMPLE = 0.01, 0.3, 32, 50_000
+
+#: If at most this many asperities could touch, those near the contact are refined alone. This saves
+#: time but takes memory.
+MOST_APART = 2**21
 
 
 @dataclass(frozen=True)
@@ -146,18 +150,19 @@ class Newton:
         refines = problem.influence.cheap_sums and not self.tolerance > 0
         if len(problem) > ALL_ITERATED and start is None:
             highest = float(np.maximum(problem.approach_bound + problem.offsets, 0.0).max())
-            part = UNEVEN if isinstance(problem.scene.sphere_radius, tuple) else MARGIN
-            margin = part * highest + _roughness(problem) / problem.units.length
+            share = UNEVEN if isinstance(problem.scene.sphere_radius, tuple) else MARGIN
+            margin = share * highest + _roughness(problem) / problem.units.length
             near = np.flatnonzero(indentation > -margin)
         while True:
             begin = indentation[near]
             del indentation  # saves memory
-            state, steps = self._iterate(problem, near, begin, refines and not problem.precise)
+            state, steps, trial = self._iterate(problem, near, begin, refines)
             iterations += steps
             loads = among_zeros(state.forces, near, len(problem))
             unknown, approach = state.unknown, float(state.at.approach)
             del state  # saves memory
-            trial = trial_of(problem, loads, roughly=True) if refines else None
+            if refines and trial is None:
+                trial = trial_of(problem, loads, roughly=True)
             if len(near) == len(problem):
                 break
             # The iteration left out some asperities: compute the gaps of all.
@@ -175,12 +180,16 @@ class Newton:
         return Solution.of(problem, loads, approach, iterations, refine=self.tolerance <= 0)
 
     def _iterate(
-        self, problem: NormalProblem, near: Indices, indentation: Array, early: bool
-    ) -> tuple[newton.Iterate, int]:
-        """The solution in which only the asperities `near` carry loads, and the number of steps.
+        self, problem: NormalProblem, near: Indices, indentation: Array, refines: bool
+    ) -> tuple[newton.Iterate, int, Trial | None]:
+        """The solution in which only the asperities `near` carry loads, the number of steps, and
+        the refined trial of this solution, if only those near should be refined.
 
-        early : True if refinement makes the remaining linear correction
+        refines : True if the solution is refined at last
         """
+        early = refines and not problem.precise  # refinement makes the last linear correction
+        if apart := early and len(near) < len(problem) <= MOST_APART:
+            problem.exact  # noqa: B018  `part` takes its own from these
         part = problem if len(near) == len(problem) else problem.restricted(near)
         law, left = Pressing(part, float(np.abs(problem.offsets).max())), 0.0
         if early:
@@ -188,11 +197,15 @@ class Newton:
         try:
             state = law.evaluate(indentation)
             assert state is not None  # an asperity is loaded at the start
-            return newton.solve(law, state, ACCURATE, self.tolerance, self.max_iterations, left)
+            state, steps = newton.solve(
+                law, state, ACCURATE, self.tolerance, self.max_iterations, left
+            )
         except SolverError as error:
             if error.iterate is not None:
                 error.iterate = among_zeros(error.iterate, near, len(problem))
             raise
+        trial = refined_loads(part, state.forces).among(problem, near) if apart else None
+        return state, steps, trial
 
 
 def _roughness(problem: NormalProblem) -> float:
