@@ -81,11 +81,7 @@ def test_a_close_pair_does_not_make_candidates_of_all(kind: Kind) -> None:
     ],
 )
 def test_the_bound_in_a_wide_scene(
-    within: float,
-    spacing: float,
-    raised: dict[int, float],
-    kind: Kind | None,
-    monkeypatch: pytest.MonkeyPatch,
+    within: float, spacing: float, raised: Any, kind: Kind | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It is close, or few asperities could touch. Without discs it comes from asperities near the
     axis where this is enough."""
