@@ -39,7 +39,7 @@ SINGLE_LIMIT, DOUBLE_LIMIT = 2e-6, 1e-13
 ENERGY = 1e-2
 
 #: A step gets a second part if it leaves more than TWICE times its tolerance. Corrections of loads
-#: aim at a tenth of the rounding error (`normal.refine.ENOUGH`), so nearly ten times this suffices.
+#: aim at a tenth of the rounding error (`normal.refine.ENOUGH`), so they may leave 8 times that.
 TWICE = 8.0
 
 MOST_ITERATIONS = 500
@@ -145,7 +145,7 @@ def _iterate(
     system: _System, smooth: Smoother | None, defect: Array, tolerance: float, total: float = 0.0
 ) -> tuple[Array | None, float]:
     """The step by preconditioned conjugate gradients (docs/theory/newton.md, "Many asperities"),
-    and the part of F that it leaves; None for the step if the matrix is not positive definite.
+    and about what part of F it leaves; None for the step if the matrix is not positive definite.
 
     The step is beta - F - A W y where an asperity is open, and (I + W diag(`shells`) W) y / W where
     one touches. Without shells F + F' d is then beta, minus r / W where asperities touch, with the

@@ -241,12 +241,15 @@ class DirectCoupling(Coupling):
             work(slice(None), slice(None), self._whole)
             return
 
+        workers = threads.worthwhile(pairs)
+        size = SHARED if workers > 1 else ENTRIES
+
         def compute(rows: slice) -> None:
-            for columns in threads.chunks(len(self.points), SHARED):
+            for columns in threads.chunks(len(self.points), size):
                 work(rows, columns, inverse_distances(self.targets[rows], self.points[columns]))
 
-        blocks = threads.chunks(len(self.targets), max(1, SHARED // len(self.points)))
-        threads.each(compute, blocks, threads.worthwhile(pairs))
+        blocks = threads.chunks(len(self.targets), max(1, size // len(self.points)))
+        threads.each(compute, blocks, workers)
 
     @cached_property
     def _entry_error(self) -> float:

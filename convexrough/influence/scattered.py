@@ -37,8 +37,8 @@ FEW = 1500
 #: has at least this part of the asperities. Affects speed only.
 SHARED = 0.25
 
-#: If there are at most this many asperities or other points, `onto` computes pair by pair. Affects
-#: speed only.
+#: If at most this many asperities or other points are given, or if a mesh would not save time,
+#: `onto` computes pair by pair. Affects speed only.
 FEW_ONTO = 2500
 
 
@@ -100,9 +100,10 @@ class ScatteredInfluence(coupling.Influence):
         return replace(self, points=self.points[which], tails=tails, whole=whole)
 
     def onto(self, points: Array) -> coupling.Coupling:
-        if min(len(points), len(self)) <= FEW_ONTO:
-            return super().onto(points)
         together = np.concatenate((points, self.points))
+        few = min(len(points), len(self)) <= FEW_ONTO
+        if few or Splitting.choose(together, 1, TOLERANCE) is None:
+            return super().onto(points)
         joint = replace(self, points=together, tails=None, whole=None)
         return coupling.JointCoupling(joint, len(points))
 

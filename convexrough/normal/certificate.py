@@ -33,8 +33,8 @@ from convexrough.sphere import hertz
 STATUSES = np.array(["undecided", "contact", "open"])
 TOUCHING, OPEN = 1, 2
 
-#: For at most this many asperities that can touch, a contact keeps the operator for friction. So
-#: does a certificate for the gaps, which also keeps what a larger matrix is made from.
+#: For at most this many asperities that can touch, a contact keeps the operator for friction, and a
+#: certificate for the gaps. In place of a larger matrix a certificate keeps another operator.
 MOST_KEPT = {"dense": ALL_SHARP, "lattice": 2**21, "scattered": 2**16}
 
 #: If no contact radius of a solution exceeds this fraction of the distance to the nearest
@@ -288,8 +288,8 @@ class Depths:
     error: Array  # error bounds of these; infinite if nothing is proved
 
     def kept(self) -> Callable[[], tuple[Array, ...]]:
-        """These depths, but without a large matrix; or, if the operator is large otherwise, a
-        function that has them."""
+        """These depths, without a large matrix; if another operator is large, a function that has
+        them."""
         problem, kind = self.problem, self.problem.influence.name
         if len(problem) <= MOST_KEPT[kind]:
             return self

@@ -33,7 +33,7 @@ from convexrough.normal.refine import CORRECTIONS, ENOUGH, Trial, mean
 from convexrough.roundoff import SAFETY
 
 #: Largest accepted residual of `Level.response` after refinement, divided by the larger of the
-#: residual before refinement and the right side.
+#: residual before refinement and the right side with beta.
 SOLVED = 1e-6
 
 #: `Level.response` computes A x to thirty digits once the rounding error of the residual exceeds

@@ -7,6 +7,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from convexrough.arithmetic.balls import TINY
 from convexrough.arrays import Array, Indices, even, evenly, largest, summed, taken
@@ -26,16 +27,17 @@ LEAST_REACH, WIDER = 1.5, 4.0 / 3.0
 
 #: `_bound_by_discs` is used if its discs cover at least the part COVERED of a rectangle about them,
 #: and if the weighted mean depth of their asperities below the highest one is at most DEEP times
-#: the bound's height above the first contact (1/3 for a smooth sphere); elsewhere it is poor. A
-#: poor bound is used if at most the part FEW of all asperities could touch. Heuristics.
+#: the bound's height above the first contact (1/3 for a smooth sphere); elsewhere it is poor. If
+#: at most the part FEW of all asperities could touch at a poor bound, a better one is computed from
+#: these alone. Heuristics.
 COVERED, DEEP, FEW = 0.45, 0.45, 0.125
 
 #: Largest depths below the highest asperity that are tried, divided by about the indentation of the
 #: sharpest asperity under the whole load: four for each factor of 2.
 DEPTHS = 2.0 ** (np.arange(-160, 1) / 4.0)
 
-#: In scenes of more than 2 SAMPLE asperities, `_bound_by_discs` first estimates from about SAMPLE
-#: of them how deep those with weights are. Affects speed only.
+#: In scenes of at least 2 SAMPLE asperities, `_bound_by_discs` first estimates from about SAMPLE of
+#: them how deep those with weights are. Affects speed and, if tips differ, slightly the bound.
 SAMPLE = 2**13
 
 #: Relative change below which the shift tau of `shifted_to_load` counts as converged. A heuristic:
@@ -113,27 +115,34 @@ def approach_bound(
 def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -> float:
     """Upper bound [length] on the approach at every solution of total `load` [force].
 
-    It is `_bound_by_discs` or, where that is nan, `approach_bound` with rates dP/dL at the
-    indentations `smooth_indentations` as weights. Where contact discs would reach their nearest
-    neighbours, the indentations are reduced, as the bound would be useless.
+    It is `_bound_by_discs` or, where that is poor, `_bound_from` those that could touch at the poor
+    bound if these are few, or those near the axis.
     """
-    bound = _bound_by_discs(scene, load)
-    for reach in _reaches(scene, load) if np.isnan(bound) else ():
-        bound = _bound_within(reach, scene, load, influence)
-        if not np.isnan(bound):
-            break
+    bound, close = _bound_by_discs(scene, load)
+    highest = scene.offsets + scene.offset_errors + 6 * ROUNDOFF * abs(bound)
+    could_touch = highest > -bound
+    if not close and np.count_nonzero(could_touch) <= FEW * len(scene):
+        others = np.zeros_like(could_touch)
+        bound = min(bound, _bound_from(could_touch, others, scene, load, influence))
+    elif not close:
+        distances = np.hypot(*scene.contact_points.T)
+        for reach in _reaches(scene, load):
+            far = distances > reach
+            bound = _bound_from(~far, far, scene, load, influence)
+            if not np.isnan(bound):
+                break
     if not np.isfinite(bound):
         raise InputError("load", found=load, expected="a load within the range of float64")
     return bound
 
 
 @np.errstate(all="ignore")
-def _bound_by_discs(scene: Scene, load: float) -> float:
+def _bound_by_discs(scene: Scene, load: float) -> tuple[float, bool]:
     """`highest_approach` by (3) of docs/theory/certificate.md, from discs about asperities that do
-    not overlap; nan where it would be poor (`COVERED`, `DEEP`)."""
+    not overlap; and False if it is poor (`COVERED`, `DEEP`) or, without a bound, infinite."""
     layout, modulus = scene.asperities.layout, scene.material.contact_modulus
     if np.inf in along(scene.sphere_radius):  # flats and cylinders
-        return np.nan
+        return np.inf, False
     # To find out whether few given points form a lattice takes too long.
     known = layout.made is not None or len(layout.points) > MANY
     if known and (lattice := scene.lattice) is not None:
@@ -146,8 +155,8 @@ def _bound_by_discs(scene: Scene, load: float) -> float:
     depths = top - offsets
 
     def tried(some: Indices, share: float = 1.0) -> tuple[float, bool]:
-        """The bound with weights for `some` asperities only, and True if it is good enough. If they
-        are a sample, which is this share of all, the bound is an estimate."""
+        """The bound with weights for `some` asperities only, and False if it is poor. If they are a
+        sample, which is this share of all, the bound is an estimate."""
         deep, own = depths[some], taken(radii, some)
         k = evenly(partial(hertz.local_coefficient, modulus), taken(scene.relative_radii, some))
         usual = float(k[0] if k.strides == (0,) else np.median(k))
@@ -167,22 +176,20 @@ def _bound_by_discs(scene: Scene, load: float) -> float:
         # Only asperities that can touch have weights, so the bound holds for a scene of these.
         bounds = np.where(limits - top < bounds, bounds, np.inf)
         bound = float(bounds[best := bounds.argmin()])
-        if bound == np.inf:
-            return bound, False
+        if bound == np.inf or not whole[best] > 1e-50:  # below this, cubes may underflow
+            return np.inf, False
         chosen = some[deep <= limits[best]]
         x, y = (2.0 * widest + np.ptp(each[chosen]) for each in scene.contact_points.T)
         covers = np.pi * float((taken(radii, chosen) ** 2).sum()) >= COVERED * share * float(x * y)
-        good = covers and depth[best] <= DEEP * above[best]
-        good |= np.count_nonzero(depths <= top + bound) <= FEW * len(depths)
-        return bound, bool(good and whole[best] > 1e-50)  # below this, cubes may underflow
+        return bound, bool(covers and depth[best] <= DEEP * above[best])
 
     most = np.inf
     if (step := len(scene) // SAMPLE) > 1:
         most = 1.1 * (top + tried(np.arange(0, len(scene), step), 1.0 / step)[0])
     while True:
-        bound, good = tried(np.flatnonzero(depths <= most))
+        bound, close = tried(np.flatnonzero(depths <= most))
         if top + bound <= most:  # then deeper ones have no weights
-            return bound if good else np.nan
+            return bound, close
         most = top + bound
 
 
@@ -198,7 +205,7 @@ def most_potential(whole: Any, least: float) -> Any:
 
 @np.errstate(all="ignore")
 def _reaches(scene: Scene, load: float) -> list[float]:
-    """Distances from the axis [length] that `_bound_within` tries: beyond the first, a smooth
+    """Distances from the axis [length] that `highest_approach` tries: beyond the first, a smooth
     contact, widened by high asperities or by the indentations of asperities, is probably open."""
     if not scene.curved:
         return [np.inf]
@@ -213,25 +220,30 @@ def _reaches(scene: Scene, load: float) -> list[float]:
 
 
 @np.errstate(all="ignore")
-def _bound_within(reach: float, scene: Scene, load: float, influence: Kind | None) -> float:
-    """`highest_approach` with weights for asperities at distances up to `reach` from the axis.
+def _bound_from(
+    some: NDArray[np.bool_], far: NDArray[np.bool_], scene: Scene, load: float, kind: Kind | None
+) -> float:
+    """`approach_bound` with rates dP/dL at the indentations `smooth_indentations` as weights. Where
+    contact discs would reach their nearest neighbours, the indentations are reduced, as the bound
+    would be useless.
 
-    It is nan if asperities beyond would have weights, too, or if the weights, as loads, may move
-    one beyond farther than all within. Two asperities are at least as far apart as their distances
-    from the axis differ.
+    It is nan if asperities of `far` would have weights, too, or if the weights, as loads, may move
+    one of them farther than all of `some`. Two asperities are at least as far apart as their
+    distances from the axis differ.
+
+    some : (N,) True for asperities that may have weights
+    far  : (N,) True for the others that could touch, which are farther from the axis
     """
-    distances, modulus = np.hypot(*scene.contact_points.T), scene.material.contact_modulus
-    far = distances > reach
-    near = scene.asperities.layout.sorted(~far)
+    near, modulus = scene.asperities.layout.sorted(some), scene.material.contact_modulus
     if len(near) == 0:
         return np.nan
     indentation, least = smooth_indentations(scene, load, near)
     weights = np.maximum(indentation, 0.0)
     few = len(near) <= FEW_ASPERITIES
-    one_box = not few and scene.lattice is not None and influence in (None, "lattice")
+    one_box = not few and scene.lattice is not None and kind in (None, "lattice")
     every = one_box or few
     which = np.arange(len(near)) if every else np.flatnonzero(weights)
-    sources = couple(scene, near[which], 1.0 / (np.pi * modulus), influence)
+    sources = couple(scene, near[which], 1.0 / (np.pi * modulus), kind)
     radii = taken(scene.relative_radii, near)
     if not one_box:
         fitting = np.minimum(weights[which], sources.separations() ** 2 / radii[which])
@@ -247,7 +259,7 @@ def _bound_within(reach: float, scene: Scene, load: float, influence: Kind | Non
         displacement[others] = onto.falloff(weights[which], 1)
     displacement *= sources.scale * (1 + SAFETY)
     if far.any():
-        loaded = np.flatnonzero(weights)
+        loaded, distances = np.flatnonzero(weights), np.hypot(*scene.contact_points.T)
         apart = distances[far].min() * (1 - SAFETY) - distances[near[loaded]]
         most = sources.scale * (weights[loaded] / np.maximum(apart, TINY)).sum() * (1 + SAFETY)
         tall = np.flatnonzero(far & (scene.offsets > least))

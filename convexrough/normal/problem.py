@@ -47,11 +47,11 @@ ALL_SHARP = 700
 #: stored, A P is always updated in this way.
 NEARBY = 1e-13
 
-#: Number of pairs of asperities that can touch and others up to which displacements of the others
-#: are computed pair by pair. Affects speed only.
+#: Number of pairs of an asperity that can touch and another one up to which a stored matrix is not
+#: replaced by transforms for displacements of the others. Affects speed only.
 FEW_PAIRS = 2**17
 
-#: Factor by which one correction by conjugate gradients reduces the residual.
+#: Factor by which one correction by conjugate gradients is meant to reduce the residual.
 REDUCTION = 1e-12
 
 

@@ -91,8 +91,8 @@ class Trial:
         return added(self.problem.exact.offsets, self.approach, -self.product)
 
     def among(self, problem: NormalProblem, which: Indices) -> Trial:
-        """The trial of the asperities of `problem`, if `which` are those of this trial; the others
-        have no loads, and products in float64."""
+        """This trial as one of `problem`, in which its asperities have the indices `which`. The
+        others have no loads; their displacements are computed in float64."""
         spread = partial(among_zeros, places=which, count=len(problem))
         loads = of_rows(spread, self.loads)
         product = problem.plain_product(loads)

@@ -50,7 +50,7 @@ NOISY = 1e-6
 MARGIN, UNEVEN, RINGS, SAMPLE = 0.01, 0.3, 32, 50_000
 
 #: If at most this many asperities could touch, those near the contact are refined alone. This saves
-#: time but takes memory.
+#: time, but takes memory for a second problem.
 MOST_APART = 2**21
 
 
@@ -183,7 +183,7 @@ class Newton:
         self, problem: NormalProblem, near: Indices, indentation: Array, refines: bool
     ) -> tuple[newton.Iterate, int, Trial | None]:
         """The solution in which only the asperities `near` carry loads, the number of steps, and
-        the refined trial of this solution, if only those near should be refined.
+        the trial of all asperities if only those near are refined, else None.
 
         refines : True if the solution is refined at last
         """

@@ -83,8 +83,8 @@ def test_a_close_pair_does_not_make_candidates_of_all(kind: Kind) -> None:
 def test_the_bound_in_a_wide_scene(
     within: float, spacing: float, raised: Any, kind: Kind | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It is close, or few asperities could touch. Without discs it comes from asperities near the
-    axis where this is enough."""
+    """It is close. It comes from the asperities that could touch at a poor bound, if they are few,
+    or near the axis where this is enough."""
     regular = cr.Asperities.hexagonal(spacing=spacing, tip_radius=0.01, within=within)
     if kind is not None:
         moved = np.random.default_rng(0).uniform(-0.3, 0.3, (len(regular), 2)) * spacing
@@ -97,9 +97,7 @@ def test_the_bound_in_a_wide_scene(
         approach = cr.press(scene, load=load, influence=kind).certificate.approach
         bound = highest_approach(scene, load, kind)
         loose = 0.1 if kind else 0.2  # equal weights: at best 1/15 above a smooth body's approach
-        close = bound <= approach + loose * (approach + max(heights))
-        assert bound >= approach * (1 - 1e-12)
-        assert close or np.mean(scene.offsets > -bound) <= few
+        assert approach * (1 - 1e-12) <= bound <= approach + loose * (approach + max(heights))
 
 
 def test_the_displacements_that_bound_the_approach() -> None:
@@ -149,12 +147,12 @@ def test_the_bound_by_discs_is_that_of_exact_displacements_or_more(
             q /= q.sum()
             local = load ** (2 / 3) * ((q * k) ** 3).sum() ** (1 / 3)
             exact.append(local + load / (np.pi * modulus) * (q / apart).sum(axis=1).max() - q @ d)
-        bound = load_control._bound_by_discs(scene, load)
+        bound, _ = load_control._bound_by_discs(scene, load)
         loose = 1.05 if moved == spread == 0 else 2.0
         assert min(exact) * (1 - 1e-12) <= bound <= min(exact) * loose
         with monkeypatch.context() as sampled:  # a sample finds the asperities that matter
             sampled.setattr(load_control, "SAMPLE", 40)
-            again = load_control._bound_by_discs(scene, load)
+            again, _ = load_control._bound_by_discs(scene, load)
             assert spread > 0 or again == pytest.approx(bound, rel=1e-12)
 
 
@@ -171,7 +169,7 @@ def test_the_bound_by_discs_counts_the_rounding_of_its_sums() -> None:
     k = (9.0 / (16.0 * scene.relative_radii)) ** (1.0 / 3.0)
     loads = ((2.0**-94 / 0.44 + heights) / k) ** 1.5
     least = (k * loads ** (2.0 / 3.0) - heights).min()  # without A P
-    assert load_control._bound_by_discs(scene, math.fsum(loads) * (1 + 1e-15)) >= least
+    assert load_control._bound_by_discs(scene, math.fsum(loads) * (1 + 1e-15))[0] >= least
 
 
 def test_the_bound_counts_what_asperities_far_out_are_displaced() -> None:
