@@ -119,12 +119,13 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
     bound if these are few, or those near the axis.
     """
     bound, close = _bound_by_discs(scene, load)
-    highest = scene.offsets + scene.offset_errors + 6 * ROUNDOFF * abs(bound)
-    could_touch = highest > -bound
-    if not close and np.count_nonzero(could_touch) <= FEW * len(scene):
+    if close:
+        return bound
+    could_touch = scene.offsets + scene.offset_errors + 6 * ROUNDOFF * abs(bound) > -bound
+    if np.count_nonzero(could_touch) <= FEW * len(scene):
         others = np.zeros_like(could_touch)
         bound = min(bound, _bound_from(could_touch, others, scene, load, influence))
-    elif not close:
+    else:
         distances = np.hypot(*scene.contact_points.T)
         for reach in _reaches(scene, load):
             far = distances > reach
