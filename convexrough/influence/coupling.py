@@ -39,7 +39,7 @@ KEPT = 2**16
 ENTRIES = 2**14
 
 #: The same number where several threads share the work, which wait for each other less often then.
-SHARED = 2**16
+IN_THREADS = 2**16
 
 #: Ways to compute the operator: a matrix, transforms on a lattice, transforms on a mesh.
 Kind = Literal["dense", "lattice", "scattered"]
@@ -242,7 +242,7 @@ class DirectCoupling(Coupling):
             return
 
         workers = threads.worthwhile(pairs)
-        size = SHARED if workers > 1 else ENTRIES
+        size = IN_THREADS if workers > 1 else ENTRIES
 
         def compute(rows: slice) -> None:
             for columns in threads.chunks(len(self.points), size):

@@ -123,13 +123,11 @@ def highest_approach(scene: Scene, load: float, influence: Kind | None = None) -
         return bound
     could_touch = scene.offsets + scene.offset_errors + 6 * ROUNDOFF * abs(bound) > -bound
     if np.count_nonzero(could_touch) <= FEW * len(scene):
-        others = np.zeros_like(could_touch)
-        bound = min(bound, _bound_from(could_touch, others, scene, load, influence))
+        bound = min(bound, _bound_from(could_touch, scene, load, influence))
     else:
         distances = np.hypot(*scene.contact_points.T)
-        for reach in _reaches(scene, load):
-            far = distances > reach
-            bound = _bound_from(~far, far, scene, load, influence)
+        for reach in _reaches(scene, load, distances):
+            bound = _bound_from(distances <= reach, scene, load, influence, distances)
             if not np.isnan(bound):
                 break
     if not np.isfinite(bound):
@@ -205,7 +203,7 @@ def most_potential(whole: Any, least: float) -> Any:
 
 
 @np.errstate(all="ignore")
-def _reaches(scene: Scene, load: float) -> list[float]:
+def _reaches(scene: Scene, load: float, distances: Array) -> list[float]:
     """Distances from the axis [length] that `highest_approach` tries: beyond the first, a smooth
     contact, widened by high asperities or by the indentations of asperities, is probably open."""
     if not scene.curved:
@@ -213,7 +211,7 @@ def _reaches(scene: Scene, load: float) -> list[float]:
     radius, modulus = scene.mean_radius, scene.material.contact_modulus
     a = float(hertz.contact_radius(load, modulus, radius))
     heights = scene.asperities.heights
-    inside = np.count_nonzero(np.hypot(*scene.contact_points.T) < a) + 1
+    inside = np.count_nonzero(distances < a) + 1
     k = hertz.local_coefficient(modulus, scene.relative_radii.mean())
     beyond = max(heights.max() - heights.mean(), hertz.indentation(load / inside, k))
     reach = float(np.sqrt((LEAST_REACH * a) ** 2 + 2.0 * radius * beyond))
@@ -222,18 +220,22 @@ def _reaches(scene: Scene, load: float) -> list[float]:
 
 @np.errstate(all="ignore")
 def _bound_from(
-    some: NDArray[np.bool_], far: NDArray[np.bool_], scene: Scene, load: float, kind: Kind | None
+    some: NDArray[np.bool_],
+    scene: Scene,
+    load: float,
+    kind: Kind | None,
+    distances: Array | None = None,
 ) -> float:
     """`approach_bound` with rates dP/dL at the indentations `smooth_indentations` as weights. Where
     contact discs would reach their nearest neighbours, the indentations are reduced, as the bound
     would be useless.
 
-    It is nan if asperities of `far` would have weights, too, or if the weights, as loads, may move
-    one of them farther than all of `some`. Two asperities are at least as far apart as their
-    distances from the axis differ.
+    It is nan if others, which could touch, would have weights, too, or if the weights, as loads,
+    may move one of them farther than all of `some`. Two asperities are at least as far apart as
+    their distances from the axis differ.
 
-    some : (N,) True for asperities that may have weights
-    far  : (N,) True for the others that could touch, which are farther from the axis
+    some      : (N,) True for asperities that may have weights
+    distances : (N,) from the axis, if others, which are farther from it, could touch
     """
     near, modulus = scene.asperities.layout.sorted(some), scene.material.contact_modulus
     if len(near) == 0:
@@ -259,8 +261,8 @@ def _bound_from(
         onto = sources.onto(scene.contact_points[near[others]])
         displacement[others] = onto.falloff(weights[which], 1)
     displacement *= sources.scale * (1 + SAFETY)
-    if far.any():
-        loaded, distances = np.flatnonzero(weights), np.hypot(*scene.contact_points.T)
+    if distances is not None and not some.all():
+        loaded, far = np.flatnonzero(weights), ~some
         apart = distances[far].min() * (1 - SAFETY) - distances[near[loaded]]
         most = sources.scale * (weights[loaded] / np.maximum(apart, TINY)).sum() * (1 + SAFETY)
         tall = np.flatnonzero(far & (scene.offsets > least))
